@@ -1,0 +1,33 @@
+// The sources behind every plain file format: samples of some type, x fastest, after a header.
+#pragma once
+
+#include <memory>
+#include <string>
+#include <vector>
+
+#include "formats/context.h"
+#include "formats/input_stream.h"
+#include "formats/mapped_file.h"
+#include "formats/source.h"
+
+namespace voxkit {
+
+/// How the samples of a voxel lie in a file.
+struct SampleLayout {
+  SampleType type = SampleType::u8;  ///< of one component
+  int components = 1;                ///< 1, or 3 / 4 u8 for RGB24 / RGBA32
+  bool big_endian = false;
+  int64_t bytes_per_voxel() const { return int64_t{components} * sample_bytes(type); }
+};
+
+/// Converts `count` voxels of file samples into voxels in memory: byte order, bias, narrowing (VoxelFormat of info).
+void convert_samples(const std::byte* in, const SampleLayout& layout, int64_t count, VoxelFormat format, std::byte* out);
+
+/// Random access: samples at `offset` of a mapped file, checked to be there. Rows are converted as they are read.
+Result<std::unique_ptr<VolumeSource>> mapped_source(std::shared_ptr<const MappedFile> file, uint64_t offset,
+                                                    const VolumeInfo& info, const SampleLayout& layout);
+/// Forward only: samples follow in a stream (gzip, bzip2, a pipe).
+std::unique_ptr<VolumeSource> streamed_source(std::unique_ptr<InputStream> stream, const VolumeInfo& info,
+                                              const SampleLayout& layout);
+
+}  // namespace voxkit

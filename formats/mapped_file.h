@@ -1,0 +1,32 @@
+// A read-only memory map of a whole file.
+#pragma once
+
+#include <cstddef>
+#include <memory>
+#include <span>
+#include <string>
+
+#include "formats/input_stream.h"
+
+namespace voxkit {
+
+class MappedFile {
+ public:
+  /// Maps a regular file.
+  static Result<std::shared_ptr<const MappedFile>> open(const std::string& path);
+  /// Copies a stream (a pipe, say) to an unlinked temporary file in $TMPDIR (default /tmp) and maps that.
+  static Result<std::shared_ptr<const MappedFile>> spool(InputStream& stream);
+  ~MappedFile();
+  MappedFile(const MappedFile&) = delete;
+  MappedFile& operator=(const MappedFile&) = delete;
+
+  std::span<const std::byte> bytes() const { return bytes_; }
+  const std::string& name() const { return name_; }
+
+ private:
+  MappedFile() = default;
+  std::span<const std::byte> bytes_;
+  std::string name_;
+};
+
+}  // namespace voxkit

@@ -1,0 +1,33 @@
+// Volumes by name: which reader or writer a name means.
+#pragma once
+
+#include <memory>
+#include <optional>
+#include <string>
+
+#include "formats/context.h"
+#include "formats/source.h"
+
+namespace voxkit {
+
+/// What a user says about an input that its name does not.
+struct OpenOptions {
+  std::optional<Index3> dims;       ///< .raw only, where it is required
+  std::optional<std::string> type;  ///< .raw only: u8 i8 u16 i16 u32 i32 f32 f64 rgb8 rgba8 bit
+  bool big_endian = false;          ///< .raw only
+  std::string grid;                 ///< .vdb: name of the grid; empty: the first float or Vec3s grid
+};
+
+/// Opens a file or a built-in by its name; reads headers, no voxels. "-" is NRRD on standard input. Compressed volumes
+/// (.svmm …) are opened by the tools, since formats/ knows no codec.
+/// Errors: ErrorCode::input with file, section and rule; ErrorCode::usage for a name that cannot be an input.
+Result<std::unique_ptr<VolumeSource>> open_volume(const std::string& name, const OpenOptions& options, Context& ctx);
+
+/// True if `name` is a built-in such as "menger:5" (which need not be well-formed).
+bool is_builtin(const std::string& name);
+
+/// Starts a volume file of the kind that `name` ends in: .nrrd .nhdr .nii .nii.gz .raw .mrc .vdb, a printf pattern of
+/// images (a folder for slices), "-" (NRRD). Refuses what the kind cannot hold (ErrorCode::usage) before creating anything.
+Result<std::unique_ptr<VolumeSink>> create_volume(const std::string& name, const VolumeInfo& info, bool force, Context& ctx);
+
+}  // namespace voxkit
