@@ -3,8 +3,10 @@
 
 #include <fmt/format.h>
 
+#include <algorithm>
 #include <array>
 #include <charconv>
+#include <optional>
 #include <string_view>
 #include <vector>
 
@@ -39,10 +41,38 @@ struct Builtin {
   std::unique_ptr<VolumeSource> (*open)(const std::vector<uint64_t>& numbers);
 };
 
+/// Extents as given, or nothing where a volume cannot have them.
+std::optional<Index3> extents(uint64_t x, uint64_t y, uint64_t z) {
+  if (std::max({x, y, z}) > static_cast<uint64_t>(max_side)) return std::nullopt;
+  const Index3 dims(static_cast<int64_t>(x), static_cast<int64_t>(y), static_cast<int64_t>(z));
+  return checked_voxels(dims) ? std::optional(dims) : std::nullopt;
+}
+bool is_side(uint64_t n) {
+  return extents(n, n, n).has_value();
+}
+
+using Numbers = std::vector<uint64_t>;
 constexpr std::array builtins{
     Builtin{"menger", "menger:LEVEL with LEVEL 0 to 13", "",
-            [](const std::vector<uint64_t>& n) {
+            [](const Numbers& n) {
               return n[0] <= max_menger_level ? menger_source(static_cast<int>(n[0])) : nullptr;
+            }},
+    Builtin{"marschner-lobb", "marschner-lobb:N with N 2 to 1664510", "",
+            [](const Numbers& n) {
+              return n[0] >= 2 && is_side(n[0]) ? marschner_lobb_source(static_cast<int64_t>(n[0])) : nullptr;
+            }},
+    Builtin{
+        "sphere", "sphere:N with N 1 to 1664510", "",
+        [](const Numbers& n) { return is_side(n[0]) ? sphere_source(static_cast<int64_t>(n[0])) : nullptr; }},
+    Builtin{"noise", "noise:N:SEED with N 1 to 1664510 and SEED a whole number", ":",
+            [](const Numbers& n) {
+              return is_side(n[0]) ? noise_source(static_cast<int64_t>(n[0]), n[1]) : nullptr;
+            }},
+    Builtin{"membrane",
+            "membrane:X,Y,Z:SEED with X, Y, Z 1 to 2^31, 2^62 voxels at most, and SEED a whole number", ",,:",
+            [](const Numbers& n) {
+              const auto dims = extents(n[0], n[1], n[2]);
+              return dims ? membrane_source(*dims, n[3]) : nullptr;
             }},
 };
 
