@@ -2,8 +2,7 @@
 #pragma once
 
 #include <memory>
-#include <string>
-#include <vector>
+#include <optional>
 
 #include "formats/context.h"
 #include "formats/input_stream.h"
@@ -17,16 +16,24 @@ struct SampleLayout {
   SampleType type = SampleType::u8;  ///< of one component
   int components = 1;                ///< 1, or 3 / 4 u8 for RGB24 / RGBA32
   bool big_endian = false;
+  /// For bits, which are packed, the byte that one voxel takes in memory.
   int64_t bytes_per_voxel() const { return int64_t{components} * sample_bytes(type); }
+  /// Bytes that so many voxels take in a file; nothing where 64 bits do not hold them. Bits are packed
+  /// without gaps.
+  std::optional<uint64_t> file_bytes(uint64_t voxels) const;
 };
 
-/// Converts `count` voxels of file samples into voxels in memory: byte order, bias, narrowing (VoxelFormat of info).
-void convert_samples(const std::byte* in, const SampleLayout& layout, int64_t count, VoxelFormat format, std::byte* out);
+/// Converts `count` voxels of file samples into voxels in memory: byte order, bias, narrowing (VoxelFormat of
+/// info). Bits start at the lowest bit of the first byte; a sample that is not zero is 1 in a BITMAP.
+void convert_samples(const std::byte* in, const SampleLayout& layout, int64_t count, VoxelFormat format,
+                     std::byte* out);
 
-/// Random access: samples at `offset` of a mapped file, checked to be there. Rows are converted as they are read.
+/// Random access: samples at `offset` of a mapped file, checked to be there. Rows are converted as they are
+/// read.
 Result<std::unique_ptr<VolumeSource>> mapped_source(std::shared_ptr<const MappedFile> file, uint64_t offset,
                                                     const VolumeInfo& info, const SampleLayout& layout);
-/// Forward only: samples follow in a stream (gzip, bzip2, a pipe).
+/// Forward only: samples follow in a stream (gzip, bzip2, a pipe); no bits. Buffers are small, whatever the
+/// box.
 std::unique_ptr<VolumeSource> streamed_source(std::unique_ptr<InputStream> stream, const VolumeInfo& info,
                                               const SampleLayout& layout);
 

@@ -23,6 +23,8 @@ class InputStream {
   Status read_exactly(std::span<std::byte> out, const char* what);
   /// Discards `count` bytes; cheap where the file can seek.
   virtual Status skip(uint64_t count);
+  /// Once everything wanted has been read: checks what guards it, such as the checksum after packed data.
+  virtual Status check_end() { return {}; }
   /// One line without its end (LF or CR LF); fails past `limit` bytes. At the end of data: an empty optional.
   Result<std::optional<std::string>> read_line(size_t limit = 1 << 16);
 
