@@ -1,1 +1,227 @@
+#include "formats/container.h"
 
+#include <fmt/format.h>
+#include <xxhash.h>
+
+#include <algorithm>
+#include <cmath>
+#include <cstring>
+
+#include "formats/little_endian.h"
+
+namespace voxkit {
+namespace {
+
+constexpr size_t block_size = 64;  // of header, trailer and alignment
+constexpr size_t entry_size = 64;
+constexpr std::array<uint8_t, 8> trailer_magic = {'V', 'O', 'X', 'T', 'A', 'B', 'L', 'E'};
+
+uint64_t checksum(std::span<const std::byte> bytes) {
+  return XXH64(bytes.data(), bytes.size(), 0);
+}
+
+std::string letters(uint32_t kind) {
+  std::string text;
+  for (int i = 0; i < 4; ++i) {
+    const char c = static_cast<char>(kind >> (8 * i) & 0xff);
+    text += c >= ' ' && c <= '~' ? c : '?';
+  }
+  return text;
+}
+
+std::string describe(const ChunkEntry& e) {
+  return fmt::format("chunk {} {}.{}", letters(e.kind), e.index, e.part);
+}
+
+}  // namespace
+
+Status ContainerWriter::write(std::span<const std::byte> bytes) {
+  position_ += bytes.size();
+  return sink_(bytes);
+}
+
+Status ContainerWriter::pad() {
+  static constexpr std::array<std::byte, block_size> zeros{};
+  return write(std::span(zeros).first((block_size - position_ % block_size) % block_size));
+}
+
+Status ContainerWriter::begin() {
+  std::array<std::byte, block_size> header{};
+  std::memcpy(header.data(), container_magic.data(), container_magic.size());
+  store_le(&header[8], container_version);
+  store_le(&header[10], static_cast<uint16_t>(codec_));
+  store_le(&header[56], checksum(std::span(header).first(56)));
+  return write(header);
+}
+
+Status ContainerWriter::add(uint32_t kind, uint32_t index, uint64_t part, std::span<const std::byte> bytes) {
+  if (position_ == 0) VOX_CHECK(begin());
+  table_.push_back({kind, index, part, position_, bytes.size(), checksum(bytes)});
+  VOX_CHECK(write(bytes));
+  return pad();
+}
+
+Status ContainerWriter::finish() {
+  if (position_ == 0) VOX_CHECK(begin());
+  std::vector<std::byte> table(table_.size() * entry_size);
+  for (size_t i = 0; i < table_.size(); ++i) {
+    std::byte* p = &table[i * entry_size];
+    const ChunkEntry& e = table_[i];
+    store_le(p, e.kind);
+    store_le(p + 4, e.index);
+    store_le(p + 8, e.part);
+    store_le(p + 16, e.offset);
+    store_le(p + 24, e.length);
+    store_le(p + 32, e.checksum);
+  }
+  std::array<std::byte, block_size> trailer{};
+  std::memcpy(trailer.data(), trailer_magic.data(), trailer_magic.size());
+  store_le<uint64_t>(&trailer[8], position_);
+  store_le<uint64_t>(&trailer[16], table_.size());
+  store_le<uint64_t>(&trailer[24], position_ + table.size() + block_size);
+  store_le(&trailer[32], checksum(table));
+  store_le(&trailer[56], checksum(std::span(trailer).first(56)));
+  VOX_CHECK(write(table));
+  return write(trailer);
+}
+
+bool is_container(std::span<const std::byte> bytes) {
+  return bytes.size() >= container_magic.size() &&
+         std::memcmp(bytes.data(), container_magic.data(), container_magic.size()) == 0;
+}
+
+Result<std::shared_ptr<const Container>> Container::open(std::span<const std::byte> bytes, std::string name,
+                                                         std::shared_ptr<const void> keep_alive) {
+  auto bad = [&](const std::string& what) { return bad_input(name, what); };
+  if (!is_container(bytes))
+    return bad("header, byte 0: not a voxkit container: expected 89 56 4F 58 0D 0A 1A 0A");
+  if (bytes.size() < 2 * block_size)
+    return bad(fmt::format("file ends after {} bytes: expected a header and a trailer of 64 bytes each",
+                           bytes.size()));
+  const std::byte* header = bytes.data();
+  if (load_le<uint64_t>(header + 56) != checksum(bytes.first(56)))
+    return bad("header, byte 56: the checksum of the header does not match");
+  const auto version = load_le<uint16_t>(header + 8);
+  if (version != container_version)
+    return bad(fmt::format("header, byte 8: container version {}: expected {}", version, container_version));
+  const auto codec = load_le<uint16_t>(header + 10);
+  if (codec != static_cast<uint16_t>(Codec::svmm))
+    return bad(fmt::format("header, byte 10: unknown codec {}", codec));
+
+  const uint64_t trailer_offset = bytes.size() - block_size;
+  const std::byte* trailer = bytes.data() + trailer_offset;
+  if (std::memcmp(trailer, trailer_magic.data(), trailer_magic.size()) != 0)
+    return bad(fmt::format("trailer, byte {}: missing: the file is cut short or has bytes appended",
+                           trailer_offset));
+  if (load_le<uint64_t>(trailer + 56) != checksum(std::span(trailer, 56)))
+    return bad(
+        fmt::format("trailer, byte {}: the checksum of the trailer does not match", trailer_offset + 56));
+  const auto table_offset = load_le<uint64_t>(trailer + 8), count = load_le<uint64_t>(trailer + 16);
+  if (load_le<uint64_t>(trailer + 24) != bytes.size())
+    return bad(fmt::format("trailer, byte {}: file length {}: expected {}", trailer_offset + 24,
+                           load_le<uint64_t>(trailer + 24), bytes.size()));
+  if (table_offset % block_size != 0 || table_offset < block_size || table_offset > trailer_offset ||
+      count != (trailer_offset - table_offset) / entry_size ||
+      (trailer_offset - table_offset) % entry_size != 0)
+    return bad(fmt::format("trailer, byte {}: a table of {} entries at byte {} does not end at the trailer",
+                           trailer_offset + 8, count, table_offset));
+  const auto table = bytes.subspan(table_offset, count * entry_size);
+  if (load_le<uint64_t>(trailer + 32) != checksum(table))
+    return bad(fmt::format("table, byte {}: the checksum of the table does not match", table_offset));
+
+  std::shared_ptr<Container> container(new Container);
+  container->table_.resize(count);
+  uint64_t end =
+      block_size;  // chunks ascend and do not overlap, so their sizes add up to no more than the file
+  for (size_t i = 0; i < count; ++i) {
+    const std::byte* p = table.data() + i * entry_size;
+    ChunkEntry& e = container->table_[i];
+    e.kind = load_le<uint32_t>(p);
+    e.index = load_le<uint32_t>(p + 4);
+    e.part = load_le<uint64_t>(p + 8);
+    e.offset = load_le<uint64_t>(p + 16);
+    e.length = load_le<uint64_t>(p + 24);
+    e.checksum = load_le<uint64_t>(p + 32);
+    if (e.offset % block_size != 0 || e.offset < end || e.offset > table_offset ||
+        e.length > table_offset - e.offset)
+      return bad(fmt::format("table, byte {}: {} of {} bytes at byte {} overlaps or leaves the file",
+                             table_offset + i * entry_size, describe(e), e.length, e.offset));
+    end = e.offset + e.length;
+  }
+  container->bytes_ = bytes;
+  container->name_ = std::move(name);
+  container->keep_alive_ = std::move(keep_alive);
+  container->codec_ = static_cast<Codec>(codec);
+  container->verified_ = std::make_unique<std::atomic<bool>[]>(count);
+  return container;
+}
+
+Result<std::span<const std::byte>> Container::chunk(size_t i) const {
+  const ChunkEntry& e = table_[i];
+  const auto bytes = bytes_.subspan(e.offset, e.length);
+  if (!verified_[i].load(std::memory_order_acquire)) {
+    if (checksum(bytes) != e.checksum)
+      return bad_input(name_, fmt::format("{}, byte {}: the checksum does not match: the file is damaged",
+                                          describe(e), e.offset));
+    if (!verified_[i].exchange(true, std::memory_order_release)) ++touched_;
+  }
+  return bytes;
+}
+
+Result<std::span<const std::byte>> Container::only_chunk(uint32_t kind) const {
+  const auto is_kind = [&](const ChunkEntry& e) { return e.kind == kind; };
+  const auto found = std::find_if(table_.begin(), table_.end(), is_kind);
+  if (found == table_.end() || std::find_if(found + 1, table_.end(), is_kind) != table_.end())
+    return bad_input(name_, fmt::format("table: expected one chunk {}", letters(kind)));
+  return chunk(static_cast<size_t>(found - table_.begin()));
+}
+
+std::vector<std::byte> pack_volume_info(const VolumeInfo& info) {
+  std::vector<std::byte> bytes(112);
+  for (int i = 0; i < 3; ++i) {
+    store_le(&bytes[8 * i], static_cast<uint64_t>(info.dims[i]));
+    store_le(&bytes[32 + 8 * i], info.spacing[i]);
+    store_le(&bytes[56 + 8 * i], info.origin[i]);
+  }
+  bytes[24] = static_cast<std::byte>(info.format);
+  bytes[25] = static_cast<std::byte>(info.sample_type);
+  bytes[26] = static_cast<std::byte>(info.range.has_value());
+  store_le(&bytes[80], info.slope);
+  store_le(&bytes[88], info.intercept);
+  store_le(&bytes[96], info.range ? info.range->lo : 0.0);
+  store_le(&bytes[104], info.range ? info.range->hi : 0.0);
+  return bytes;
+}
+
+Result<VolumeInfo> unpack_volume_info(std::span<const std::byte> bytes, const std::string& file) {
+  if (bytes.size() != 112)
+    return bad_input(file, fmt::format("chunk VOLI: {} bytes: expected 112", bytes.size()));
+  VolumeInfo info;
+  for (int i = 0; i < 3; ++i) {
+    info.dims[i] = static_cast<int64_t>(load_le<uint64_t>(&bytes[8 * i]));
+    info.spacing[i] = load_le<double>(&bytes[32 + 8 * i]);
+    info.origin[i] = load_le<double>(&bytes[56 + 8 * i]);
+    if (!std::isfinite(info.spacing[i]) || !std::isfinite(info.origin[i]))
+      return bad_input(file, "chunk VOLI, byte 32: spacing and origin: expected finite numbers");
+  }
+  if (!checked_voxels(info.dims))
+    return bad_input(
+        file,
+        fmt::format("chunk VOLI, byte 0: dimensions {}x{}x{}: expected 1 to 2^31 a side and 2^62 in all",
+                    info.dims.x, info.dims.y, info.dims.z));
+  const int format = std::to_integer<int>(bytes[24]), type = std::to_integer<int>(bytes[25]);
+  if (format < 1 || format > 6)
+    return bad_input(file, fmt::format("chunk VOLI, byte 24: unknown voxel format {}", format));
+  info.format = static_cast<VoxelFormat>(format);
+  info.sample_type = static_cast<SampleType>(type);
+  if (type < 1 || type > 11 || (!is_colour(info.format) && scalar_format(info.sample_type) != info.format))
+    return bad_input(file, fmt::format("chunk VOLI, byte 25: sample type {} does not go with {}", type,
+                                       name(info.format)));
+  info.slope = load_le<double>(&bytes[80]);
+  info.intercept = load_le<double>(&bytes[88]);
+  if (bytes[26] != std::byte{0})
+    info.range = ValueRange{load_le<double>(&bytes[96]), load_le<double>(&bytes[104])};
+  return info;
+}
+
+}  // namespace voxkit

@@ -10,9 +10,11 @@ namespace voxkit {
 namespace {
 
 uint64_t usable_memory() {
-  uint64_t bytes = static_cast<uint64_t>(sysconf(_SC_PHYS_PAGES)) * static_cast<uint64_t>(sysconf(_SC_PAGE_SIZE));
+  uint64_t bytes =
+      static_cast<uint64_t>(sysconf(_SC_PHYS_PAGES)) * static_cast<uint64_t>(sysconf(_SC_PAGE_SIZE));
   uint64_t group = 0;
-  if (std::ifstream file("/sys/fs/cgroup/memory.max"); file >> group && group > 0) bytes = std::min(bytes, group);
+  if (std::ifstream file("/sys/fs/cgroup/memory.max"); file >> group && group > 0)
+    bytes = std::min(bytes, group);
   return bytes;
 }
 
@@ -31,9 +33,10 @@ Status MemoryBudget::reserve(uint64_t bytes, const std::string& what) {
   uint64_t used = used_;
   do {
     if (bytes > limit_ || used > limit_ - bytes)
-      return fail(ErrorCode::limit, {},
-                  fmt::format("{} needs {} bytes of memory: --max-memory allows {}: use --max-memory {}M or more", what,
-                              bytes, limit_, (used + bytes) / (1 << 20) + 1));
+      return fail(
+          ErrorCode::limit, {},
+          fmt::format("{} needs {} bytes of memory: --max-memory allows {}: use --max-memory {}M or more",
+                      what, bytes, limit_, (used + bytes) / (1 << 20) + 1));
   } while (!used_.compare_exchange_weak(used, used + bytes));
   return {};
 }

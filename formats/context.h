@@ -16,7 +16,8 @@ class MemoryBudget {
   /// limit 0: three quarters of the memory this process may use (physical, or its cgroup's limit).
   explicit MemoryBudget(uint64_t limit = 0);
   uint64_t limit() const { return limit_; }
-  /// Reserves bytes for `what` until `release`, or fails with ErrorCode::limit, naming --max-memory and the size needed.
+  /// Reserves bytes for `what` until `release`, or fails with ErrorCode::limit, naming --max-memory and the
+  /// size needed.
   Status reserve(uint64_t bytes, const std::string& what);
   void release(uint64_t bytes) { used_ -= bytes; }
 
@@ -26,8 +27,8 @@ class MemoryBudget {
 };
 
 struct Context {
-  int threads = 1;                                  ///< workers of parallel_for; results never depend on it
-  MemoryBudget* memory = nullptr;                   ///< never null in a call
+  int threads = 1;                 ///< workers of parallel_for; results never depend on it
+  MemoryBudget* memory = nullptr;  ///< never null in a call
   std::function<void(double)> progress = [](double) {};  ///< fraction done, 0..1, from one thread at a time
 };
 

@@ -32,7 +32,8 @@ Result<std::span<const std::byte>> map(int fd, const std::string& name) {
   if (st.st_size == 0) return std::span<const std::byte>{};
   const size_t size = static_cast<size_t>(st.st_size);
   void* address = ::mmap(nullptr, size, PROT_READ, MAP_SHARED, fd, 0);
-  if (address == MAP_FAILED) return bad_input(name, fmt::format("cannot be mapped: {}", std::strerror(errno)));
+  if (address == MAP_FAILED)
+    return bad_input(name, fmt::format("cannot be mapped: {}", std::strerror(errno)));
   return std::span(static_cast<const std::byte*>(address), size);
 }
 
@@ -53,7 +54,9 @@ Result<std::shared_ptr<const MappedFile>> MappedFile::spool(InputStream& stream)
   const char* folder = std::getenv("TMPDIR");
   std::string path = fmt::format("{}/voxkit-XXXXXX", folder && *folder ? folder : "/tmp");
   Descriptor file{::mkostemp(path.data(), O_CLOEXEC)};
-  if (file.fd < 0) return fail(ErrorCode::output, path, fmt::format("cannot create a temporary file: {}", std::strerror(errno)));
+  if (file.fd < 0)
+    return fail(ErrorCode::output, path,
+                fmt::format("cannot create a temporary file: {}", std::strerror(errno)));
   ::unlink(path.c_str());
   std::vector<std::byte> buffer(size_t{1} << 20);
   for (;;) {

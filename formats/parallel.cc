@@ -18,8 +18,9 @@ namespace voxkit {
 int available_threads() {
   cpu_set_t set;
   CPU_ZERO(&set);
-  int threads = sched_getaffinity(0, sizeof set, &set) == 0 ? CPU_COUNT(&set)
-                                                             : static_cast<int>(std::thread::hardware_concurrency());
+  int threads = sched_getaffinity(0, sizeof set, &set) == 0
+                    ? CPU_COUNT(&set)
+                    : static_cast<int>(std::thread::hardware_concurrency());
   // cgroup v2: "QUOTA PERIOD" in microseconds, or "max PERIOD".
   std::string quota;
   double period = 0;

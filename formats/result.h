@@ -46,11 +46,12 @@ inline tl::unexpected<Error> bad_usage(std::string what) {
 #define VOX_CONCAT_(a, b) a##b
 #define VOX_CONCAT(a, b) VOX_CONCAT_(a, b)
 /// VOX_TRY(auto x, f()): x becomes the value, or the enclosing function returns the error.
-#define VOX_TRY(declaration, expression)                                                 \
-  auto VOX_CONCAT(vox_try_, __LINE__) = (expression);                                    \
-  if (!VOX_CONCAT(vox_try_, __LINE__))                                                   \
+#define VOX_TRY(declaration, expression)                                                       \
+  auto VOX_CONCAT(vox_try_, __LINE__) = (expression);                                          \
+  if (!VOX_CONCAT(vox_try_, __LINE__))                                                         \
     return tl::unexpected<::voxkit::Error>(std::move(VOX_CONCAT(vox_try_, __LINE__)).error()); \
   declaration = std::move(*VOX_CONCAT(vox_try_, __LINE__))
 /// VOX_CHECK(f()): the enclosing function returns the error, if there is one.
-#define VOX_CHECK(expression) \
-  if (auto vox_status = (expression); !vox_status) return tl::unexpected<::voxkit::Error>(std::move(vox_status).error())
+#define VOX_CHECK(expression)                                                                    \
+  if (auto VOX_CONCAT(vox_status_, __LINE__) = (expression); !VOX_CONCAT(vox_status_, __LINE__)) \
+  return tl::unexpected<::voxkit::Error>(std::move(VOX_CONCAT(vox_status_, __LINE__)).error())

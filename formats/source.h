@@ -16,16 +16,16 @@ class VolumeSource {
 
   const VolumeInfo& info() const { return info_; }
 
-  /// True where the voxels can only be had front to back (gzip, pipes). Then `read` must be asked, from one thread,
-  /// for boxes of full width and height whose z ranges ascend without overlap; gaps are skipped.
+  /// True where the voxels can only be had front to back (gzip, pipes). Then `read` must be asked, from one
+  /// thread, for boxes of full width and height whose z ranges ascend without overlap; gaps are skipped.
   virtual bool forward_only() const { return false; }
 
-  /// Writes the voxels of `box` (inside info().box()) to `out`. Any boxes, in any order, from any number of threads,
-  /// unless forward_only(). On an error the contents of `out` are unspecified.
+  /// Writes the voxels of `box` (inside info().box()) to `out`. Any boxes, in any order, from any number of
+  /// threads, unless forward_only(). On an error the contents of `out` are unspecified.
   virtual Status read(const Box& box, VoxelSpan out) = 0;
 
-  /// The value that every voxel of `box` has, where that is known *without reading voxels*; nothing where it is not
-  /// known. A source that knows (tiles, recursion, a compressed tree) saves its callers the reading.
+  /// The value that every voxel of `box` has, where that is known *without reading voxels*; nothing where it
+  /// is not known. A source that knows (tiles, recursion, a compressed tree) saves its callers the reading.
   virtual std::optional<Voxel> uniform(const Box& box) const {
     (void)box;
     return std::nullopt;

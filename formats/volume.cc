@@ -6,22 +6,34 @@ namespace voxkit {
 
 std::string_view name(VoxelFormat f) {
   switch (f) {
-    case VoxelFormat::rgba32: return "RGBA32";
-    case VoxelFormat::rgb24: return "RGB24";
-    case VoxelFormat::density8: return "DENSITY8";
-    case VoxelFormat::density16: return "DENSITY16";
-    case VoxelFormat::float32: return "FLOAT32";
-    case VoxelFormat::bitmap: return "BITMAP";
+    case VoxelFormat::rgba32:
+      return "RGBA32";
+    case VoxelFormat::rgb24:
+      return "RGB24";
+    case VoxelFormat::density8:
+      return "DENSITY8";
+    case VoxelFormat::density16:
+      return "DENSITY16";
+    case VoxelFormat::float32:
+      return "FLOAT32";
+    case VoxelFormat::bitmap:
+      return "BITMAP";
   }
   return "?";
 }
 
 VoxelFormat scalar_format(SampleType t) {
   switch (t) {
-    case SampleType::u8: case SampleType::i8: return VoxelFormat::density8;
-    case SampleType::u16: case SampleType::i16: return VoxelFormat::density16;
-    case SampleType::bit: return VoxelFormat::bitmap;
-    default: return VoxelFormat::float32;
+    case SampleType::u8:
+    case SampleType::i8:
+      return VoxelFormat::density8;
+    case SampleType::u16:
+    case SampleType::i16:
+      return VoxelFormat::density16;
+    case SampleType::bit:
+      return VoxelFormat::bitmap;
+    default:
+      return VoxelFormat::float32;
   }
 }
 
@@ -29,7 +41,8 @@ std::optional<uint64_t> checked_voxels(Index3 dims) {
   uint64_t product = 1;
   for (int axis = 0; axis < 3; ++axis) {
     if (dims[axis] < 1 || dims[axis] > max_side) return std::nullopt;
-    if (__builtin_mul_overflow(product, static_cast<uint64_t>(dims[axis]), &product) || product > uint64_t{1} << 62)
+    if (__builtin_mul_overflow(product, static_cast<uint64_t>(dims[axis]), &product) || product > uint64_t{1}
+                                                                                                      << 62)
       return std::nullopt;
   }
   return product;
@@ -54,7 +67,8 @@ void fill(VoxelSpan out, Index3 size, VoxelFormat f, const Voxel& value) {
       // Doubling copies: a memcpy moves any voxel size at full speed.
       const size_t total = static_cast<size_t>(size.x) * bytes;
       std::memcpy(row, value.bytes.data(), bytes);
-      for (size_t done = bytes; done < total; done *= 2) std::memcpy(row + done, row, std::min(done, total - done));
+      for (size_t done = bytes; done < total; done *= 2)
+        std::memcpy(row + done, row, std::min(done, total - done));
     }
 }
 

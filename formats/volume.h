@@ -18,7 +18,8 @@ using Index3 = glm::i64vec3;
 /// Largest extent a side. Products of three are formed with `checked_voxels`.
 inline constexpr int64_t max_side = int64_t{1} << 31;
 
-/// How one voxel is held in memory and in files of ours (thesis section 2.2.1). Numbers are part of FORMAT.md.
+/// How one voxel is held in memory and in files of ours (thesis section 2.2.1). Numbers are part of
+/// FORMAT.md.
 enum class VoxelFormat : uint8_t {
   rgba32 = 1,     ///< 4 bytes R, G, B, A, 0..255; alpha is coverage, 0 = void
   rgb24 = 2,      ///< 3 bytes R, G, B
@@ -31,12 +32,18 @@ enum class VoxelFormat : uint8_t {
 /// Bytes of one voxel in a memory box.
 constexpr int voxel_bytes(VoxelFormat f) {
   switch (f) {
-    case VoxelFormat::rgba32: return 4;
-    case VoxelFormat::rgb24: return 3;
-    case VoxelFormat::density8: return 1;
-    case VoxelFormat::density16: return 2;
-    case VoxelFormat::float32: return 4;
-    case VoxelFormat::bitmap: return 1;
+    case VoxelFormat::rgba32:
+      return 4;
+    case VoxelFormat::rgb24:
+      return 3;
+    case VoxelFormat::density8:
+      return 1;
+    case VoxelFormat::density16:
+      return 2;
+    case VoxelFormat::float32:
+      return 4;
+    case VoxelFormat::bitmap:
+      return 1;
   }
   return 0;
 }
@@ -44,7 +51,9 @@ constexpr int voxel_bytes(VoxelFormat f) {
 constexpr int attributes(VoxelFormat f) {
   return f == VoxelFormat::rgba32 ? 4 : f == VoxelFormat::rgb24 ? 3 : 1;
 }
-constexpr bool is_colour(VoxelFormat f) { return attributes(f) > 1; }
+constexpr bool is_colour(VoxelFormat f) {
+  return attributes(f) > 1;
+}
 /// "RGBA32", "RGB24", "DENSITY8", "DENSITY16", "FLOAT32", "BITMAP".
 std::string_view name(VoxelFormat f);
 
@@ -79,7 +88,8 @@ struct Box {
     return v.x >= lo.x && v.y >= lo.y && v.z >= lo.z && v.x < hi.x && v.y < hi.y && v.z < hi.z;
   }
   bool contains(const Box& b) const {
-    return b.lo.x >= lo.x && b.lo.y >= lo.y && b.lo.z >= lo.z && b.hi.x <= hi.x && b.hi.y <= hi.y && b.hi.z <= hi.z;
+    return b.lo.x >= lo.x && b.lo.y >= lo.y && b.lo.z >= lo.z && b.hi.x <= hi.x && b.hi.y <= hi.y &&
+           b.hi.z <= hi.z;
   }
   friend bool operator==(const Box&, const Box&) = default;
 };
@@ -88,18 +98,28 @@ inline Box intersect(const Box& a, const Box& b) {
           {std::min(a.hi.x, b.hi.x), std::min(a.hi.y, b.hi.y), std::min(a.hi.z, b.hi.z)}};
 }
 
-/// The type of a sample in the file that a volume was read from; decoding to the same kind of file restores it.
+/// The type of a sample in the file that a volume was read from; decoding to the same kind of file restores
+/// it.
 enum class SampleType : uint8_t { u8 = 1, i8, u16, i16, u32, i32, u64, i64, f32, f64, bit };
 constexpr int sample_bytes(SampleType t) {
   switch (t) {
-    case SampleType::u8: case SampleType::i8: case SampleType::bit: return 1;
-    case SampleType::u16: case SampleType::i16: return 2;
-    case SampleType::u32: case SampleType::i32: case SampleType::f32: return 4;
-    default: return 8;
+    case SampleType::u8:
+    case SampleType::i8:
+    case SampleType::bit:
+      return 1;
+    case SampleType::u16:
+    case SampleType::i16:
+      return 2;
+    case SampleType::u32:
+    case SampleType::i32:
+    case SampleType::f32:
+      return 4;
+    default:
+      return 8;
   }
 }
-/// The format in which samples of a type are held: u8, i8 -> DENSITY8; u16, i16 -> DENSITY16; bit -> BITMAP; all
-/// wider types -> FLOAT32, rounded to nearest (exact for integers up to 2^24).
+/// The format in which samples of a type are held: u8, i8 -> DENSITY8; u16, i16 -> DENSITY16; bit -> BITMAP;
+/// all wider types -> FLOAT32, rounded to nearest (exact for integers up to 2^24).
 VoxelFormat scalar_format(SampleType t);
 /// What is added to a sample to store it: 128 for i8, 32768 for i16, else 0. The round trip is exact.
 constexpr int32_t storage_bias(SampleType t) {
@@ -114,13 +134,13 @@ struct ValueRange {
 
 /// The facts about a volume that are known before any voxel is read.
 struct VolumeInfo {
-  Index3 dims{0};                                       ///< voxels along x (fastest), y, z; each 1..2^31
+  Index3 dims{0};  ///< voxels along x (fastest), y, z; each 1..2^31
   VoxelFormat format = VoxelFormat::density8;
-  SampleType sample_type = SampleType::u8;              ///< type in the file; scalars only
-  std::array<double, 3> spacing{1, 1, 1};               ///< edge lengths of a voxel, in the file's unit
-  std::array<double, 3> origin{0, 0, 0};                ///< position of the centre of voxel (0,0,0)
-  double slope = 1, intercept = 0;                      ///< real value = slope * sample + intercept (recorded, not applied)
-  std::optional<ValueRange> range;                      ///< of stored values, where the file states it
+  SampleType sample_type = SampleType::u8;  ///< type in the file; scalars only
+  std::array<double, 3> spacing{1, 1, 1};   ///< edge lengths of a voxel, in the file's unit
+  std::array<double, 3> origin{0, 0, 0};    ///< position of the centre of voxel (0,0,0)
+  double slope = 1, intercept = 0;  ///< real value = slope * sample + intercept (recorded, not applied)
+  std::optional<ValueRange> range;  ///< of stored values, where the file states it
 
   Box box() const { return {{0, 0, 0}, dims}; }
   int32_t bias() const { return is_colour(format) ? 0 : storage_bias(sample_type); }

@@ -1,1 +1,258 @@
+// Random access to a compressed volume: opening, single voxels, regions (thesis section 3.1).
+#include <fmt/format.h>
 
+#include <algorithm>
+#include <cmath>
+
+#include "libsvmm/base_block.h"
+#include "libsvmm/store.h"
+
+namespace voxkit::svmm {
+namespace {
+
+Index3 ceil_divide(Index3 v, int64_t by) {
+  return (v + Index3(by - 1)) / Index3(by);
+}
+
+}  // namespace
+
+Volume::Volume() = default;
+Volume::~Volume() = default;
+
+Result<std::shared_ptr<const Volume>> Volume::open(std::shared_ptr<const Container> container) {
+  const std::string& file = container->name();
+  if (container->codec() != Codec::svmm) return bad_input(file, "header, byte 10: not an SVMM volume");
+  std::shared_ptr<Volume> volume(new Volume);
+  VOX_TRY(const auto info_bytes, container->only_chunk(volume_info_kind));
+  VOX_TRY(volume->info_, unpack_volume_info(info_bytes, file));
+  VOX_TRY(const auto params_bytes, container->only_chunk(params_kind));
+  VOX_TRY(auto unpacked, unpack_params(params_bytes, volume->info_, file));
+  volume->params_ = std::move(unpacked.params);
+  volume->levels_ = std::move(unpacked.levels);
+  volume->store_ = std::make_unique<Store>();
+
+  // Every level's blocks must be there, in whole chunks.
+  auto& stores = volume->store_->levels;
+  stores.resize(volume->levels_.size());
+  const auto& table = container->table();
+  for (size_t i = 0; i < table.size(); ++i) {
+    if (table[i].kind != blocks_kind) continue;
+    if (table[i].index >= stores.size() || table[i].part != stores[table[i].index].chunks.size())
+      return bad_input(file,
+                       fmt::format("table: chunk BLKS {}.{} is out of order", table[i].index, table[i].part));
+    stores[table[i].index].chunks.push_back(i);
+  }
+  for (size_t k = 0; k < stores.size(); ++k) {
+    const Level& level = volume->levels_[k];
+    stores[k].chunk_log2 = blocks_per_chunk_log2(level.block_bytes);
+    stores[k].size = level.blockwidth ? Index3(level.blockwidth) : level.dims;
+    uint64_t rest = level.blocks;
+    for (size_t chunk : stores[k].chunks) {
+      const uint64_t blocks = std::min(rest, uint64_t{1} << stores[k].chunk_log2);
+      uint64_t bytes = 0;
+      if (blocks == 0 || __builtin_mul_overflow(blocks, level.block_bytes, &bytes) ||
+          bytes != table[chunk].length)
+        return bad_input(file,
+                         fmt::format("table: chunk BLKS {}.{} has {} bytes: expected {} blocks of {}", k,
+                                     table[chunk].part, table[chunk].length, blocks, level.block_bytes));
+      rest -= blocks;
+    }
+    if (rest != 0)
+      return bad_input(file, fmt::format("table: level {} lacks {} of its {} blocks", k, rest, level.blocks));
+  }
+  volume->container_ = std::move(container);
+  return volume;
+}
+
+Index3 Volume::dims_at(int level) const {
+  return ceil_divide(info_.dims, static_cast<int64_t>(levels_[static_cast<size_t>(level)].mip_factor));
+}
+
+/// Walks down from the root to one voxel or a box.
+struct Decoder {
+  const Volume& volume;
+  const size_t stop;  ///< level whose voxels are wanted
+  const VoxelFormat format = volume.info_.format;
+  const Layout layout = volume.params_.layout;
+
+  size_t root() const { return volume.levels_.size() - 1; }
+  /// Whether blocks of level k have links. The base has none (in a volume of one level, the root is the
+  /// base).
+  static bool structural(size_t k) { return k > 0; }
+  StructuralBlock structural_block(size_t k, const std::byte* bytes) const {
+    return {bytes, volume.store_->levels[k].size, format, layout};
+  }
+  Result<const std::byte*> block(size_t k, uint64_t number) const {
+    return volume.store_->block(volume, k, number);
+  }
+  /// Base voxels, in voxels of the stop level, along the edge of one voxel of level k.
+  int64_t scale(size_t k) const {
+    return static_cast<int64_t>(volume.levels_[k].mip_factor / volume.levels_[stop].mip_factor);
+  }
+
+  struct Found {
+    Voxel value;   ///< undecoded (coverage of a BITMAP)
+    size_t level;  ///< of the voxel found
+    bool terminal;
+    const std::byte* base_block =
+        nullptr;  ///< if level == 0: its block, not yet decoded; `value` is the parent's
+    Index3 in_block{0};
+  };
+  /// The voxel that covers `v` (of the stop level): terminal, or of level `floor`.
+  Result<Found> descend(Index3 v, size_t floor) const {
+    size_t k = root();
+    VOX_TRY(const std::byte* bytes, block(k, 0));
+    Found found{{}, k, false, nullptr, {}};
+    for (;; --k) {
+      const Index3 at = v / Index3(scale(k));
+      const Index3 size = volume.store_->levels[k].size;
+      const Index3 in_block = k == root() ? at : at % size;
+      found.level = k;
+      if (!structural(k)) {
+        found.base_block = bytes;
+        found.in_block = in_block;
+        found.terminal = true;
+        return found;
+      }
+      const StructuralBlock here = structural_block(k, bytes);
+      const int64_t index = voxel_index(in_block, size);
+      const Link link = here.link(index / 8);
+      found.value = here.value(index);
+      found.terminal = !(link.mask >> (index % 8) & 1u);
+      if (found.terminal || k == floor) return found;
+      VOX_TRY(bytes, block(k - 1, link.child(static_cast<int>(index % 8))));
+    }
+  }
+
+  /// Writes the part of `box` (of the stop level) that a block of level k at `origin` (in voxels of level k)
+  /// covers. `parent` is its equivalent voxel's value, undecoded.
+  Status decode_block(size_t k, const std::byte* bytes, Index3 origin, const Voxel& parent, const Box& box,
+                      VoxelSpan out) const {
+    const Index3 size = volume.store_->levels[k].size;
+    if (!structural(k)) return decode_base(bytes, origin, size, parent, box, out);
+    const int64_t edge = scale(k);
+    const StructuralBlock here = structural_block(k, bytes);
+    // Voxels of the block that the box touches, widened to subblocks.
+    const Box touched =
+        intersect({box.lo / Index3(edge) - origin, ceil_divide(box.hi, edge) - origin}, {Index3(0), size});
+    for (int64_t z = touched.lo.z & ~1; z < touched.hi.z; z += 2)
+      for (int64_t y = touched.lo.y & ~1; y < touched.hi.y; y += 2)
+        for (int64_t x = touched.lo.x & ~1; x < touched.hi.x; x += 2) {
+          const int64_t s = subblock_index({x, y, z}, size);
+          const Link link = here.link(s);
+          for (int i = 0; i < 8; ++i) {
+            const Index3 v = origin + Index3(x + (i & 1), y + (i >> 1 & 1), z + (i >> 2));
+            const Box part = intersect({v * edge, (v + Index3(1)) * edge}, box);
+            if (part.empty()) continue;
+            const Voxel value = here.value(s * 8 + i);
+            if (k > stop && (link.mask >> i & 1u)) {
+              VOX_TRY(const std::byte* child, block(k - 1, link.child(i)));
+              VOX_CHECK(
+                  decode_block(k - 1, child, v * int64_t{volume.levels_[k - 1].blockwidth}, value, box, out));
+            } else {
+              const Index3 at = part.lo - box.lo;
+              fill({out.row(at.y, at.z) + at.x * voxel_bytes(format), out.row_stride, out.slice_stride},
+                   part.size(), format, decoded_value(value, format));
+            }
+          }
+        }
+    return {};
+  }
+
+  Status decode_base(const std::byte* bytes, Index3 origin, Index3 size, const Voxel& parent, const Box& box,
+                     VoxelSpan out) const {
+    const Box part = intersect({origin, origin + size}, box);
+    const size_t stride = static_cast<size_t>(voxel_bytes(format));
+    const bool stored_as_is =
+        volume.params_.base == Base::raw && layout == Layout::plain && format != VoxelFormat::bitmap;
+    thread_local std::vector<std::byte> decoded;
+    if (!stored_as_is) {
+      decoded.resize(static_cast<size_t>(size.x * size.y * size.z) * stride);
+      decode_base_block(bytes, size, format, volume.params_.base, layout, parent, decoded.data());
+      bytes = decoded.data();
+    }
+    const Index3 lo = part.lo - origin, hi = part.hi - origin, shift = origin - box.lo;
+    for (int64_t z = lo.z; z < hi.z; ++z)
+      for (int64_t y = lo.y; y < hi.y; ++y) {
+        std::byte* row = out.row(y + shift.y, z + shift.z) + (lo.x + shift.x) * static_cast<int64_t>(stride);
+        const std::byte* in = bytes + static_cast<size_t>(voxel_index({lo.x & ~1, y, z}, size)) * stride;
+        int64_t x = lo.x;
+        if (x & 1) std::memcpy(row, in + stride, stride), row += stride, in += 8 * stride, ++x;
+        for (; x + 2 <= hi.x; x += 2, row += 2 * stride, in += 8 * stride) std::memcpy(row, in, 2 * stride);
+        if (x < hi.x) std::memcpy(row, in, stride);
+      }
+    return {};
+  }
+};
+
+Result<Voxel> Volume::sample(Index3 voxel, int level) const {
+  const Decoder decoder{*this, static_cast<size_t>(level)};
+  if (!Box{Index3(0), dims_at(level)}.contains(voxel))
+    return fail(ErrorCode::internal, container_->name(), "sample outside the volume");
+  VOX_TRY(const auto found, decoder.descend(voxel, decoder.stop));
+  if (!found.base_block) return decoded_value(found.value, info_.format);
+  Voxel v;
+  const Box one{voxel, voxel + Index3(1)};
+  VOX_CHECK(decoder.decode_base(found.base_block, voxel - found.in_block, store_->levels[0].size, found.value,
+                                one, packed(v.bytes.data(), Index3(1), info_.format)));
+  return v;
+}
+
+Status Volume::decode(const Box& box, int level, VoxelSpan out) const {
+  if (box.empty()) return {};
+  if (!Box{Index3(0), dims_at(level)}.contains(box))
+    return fail(ErrorCode::internal, container_->name(), "box outside the volume");
+  const Decoder decoder{*this, static_cast<size_t>(level)};
+  VOX_TRY(const std::byte* root, decoder.block(decoder.root(), 0));
+  return decoder.decode_block(decoder.root(), root, Index3(0), {}, box, out);
+}
+
+std::optional<Voxel> Volume::uniform(const Box& box, int level) const {
+  if (box.empty() || levels_.size() == 1) return std::nullopt;
+  const Decoder decoder{*this, static_cast<size_t>(level)};
+  // The first corner's voxel must be terminal and reach the last corner. Blocks below that could not, are not
+  // looked at.
+  size_t floor = decoder.root();
+  while (floor > decoder.stop && floor > 1) {
+    const Index3 edge(decoder.scale(floor - 1));
+    if (box.lo / edge != (box.hi - Index3(1)) / edge) break;
+    --floor;
+  }
+  const Index3 edge(decoder.scale(floor));
+  if (box.lo / edge != (box.hi - Index3(1)) / edge) return std::nullopt;
+  const auto found = decoder.descend(box.lo, floor);
+  if (!found || found->base_block || !(found->terminal || found->level == decoder.stop)) return std::nullopt;
+  return decoded_value(found->value, info_.format);
+}
+
+namespace {
+
+class SvmmSource final : public VolumeSource {
+ public:
+  SvmmSource(std::shared_ptr<const Volume> volume, int level) : volume_(std::move(volume)), level_(level) {
+    info_ = volume_->info();
+    info_.dims = volume_->dims_at(level);
+    const double factor = static_cast<double>(volume_->levels()[static_cast<size_t>(level)].mip_factor);
+    for (size_t i = 0; i < 3; ++i) {
+      info_.origin[i] += info_.spacing[i] * (factor - 1) / 2;  // the centre of the first voxel
+      info_.spacing[i] *= factor;
+    }
+  }
+  Status read(const Box& box, VoxelSpan out) override { return volume_->decode(box, level_, out); }
+  std::optional<Voxel> uniform(const Box& box) const override { return volume_->uniform(box, level_); }
+
+ private:
+  std::shared_ptr<const Volume> volume_;
+  int level_;
+};
+
+}  // namespace
+
+Result<std::unique_ptr<VolumeSource>> open_source(std::shared_ptr<const Volume> volume, int level) {
+  const int levels = static_cast<int>(volume->levels().size());
+  if (level < 0 || level >= levels)
+    return bad_usage(fmt::format("--level {}: the file has levels 0 to {}", level, levels - 1));
+  return std::make_unique<SvmmSource>(std::move(volume), level);
+}
+
+}  // namespace voxkit::svmm

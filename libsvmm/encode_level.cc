@@ -1,1 +1,50 @@
+#include "libsvmm/encode_level.h"
 
+#include <cstring>
+
+namespace voxkit::svmm {
+
+void relocate_links(std::byte* blocks, uint64_t count, Index3 size, VoxelFormat f, Layout layout,
+                    uint64_t base) {
+  if (base == 0) return;
+  const int64_t voxels = size.x * size.y * size.z;
+  const uint64_t block_bytes = structural_block_bytes(static_cast<uint64_t>(voxels), f, layout);
+  for (uint64_t b = 0; b < count; ++b, blocks += block_bytes) {
+    const StructuralBlock block{blocks, size, f, layout};
+    for (int64_t s = 0; s < voxels / 8; ++s) {
+      Link link = block.link(s);
+      if (link.mask == 0) continue;
+      link.first += base;
+      if (layout == Layout::plain) {
+        store_le(blocks + voxels * value_bytes(f) + s * 8, pack_link(link));
+      } else {
+        for (int i = 0; i < 8; ++i) {
+          std::byte* word = blocks + (s * 8 + i) * word_bytes(f);
+          store_word(word, f,
+                     (load_word(word, f) & ~15u) | static_cast<uint32_t>(link.first >> (4 * i) & 15u));
+        }
+      }
+    }
+  }
+}
+
+void gather_block(ConstVoxelSpan voxels, Index3 size, Index3 valid, VoxelFormat f, std::byte* out) {
+  const size_t bytes = static_cast<size_t>(voxel_bytes(f));
+  if (valid == size) {  // pairs of voxels along x are neighbours in both orders
+    for (int64_t z = 0; z < size.z; z += 2)
+      for (int64_t y = 0; y < size.y; y += 2)
+        for (int64_t x = 0; x < size.x; x += 2)
+          for (int i = 0; i < 4; ++i, out += 2 * bytes)
+            std::memcpy(out, voxels.row(y + (i & 1), z + (i >> 1)) + static_cast<size_t>(x) * bytes,
+                        2 * bytes);
+    return;
+  }
+  std::memset(out, 0, static_cast<size_t>(size.x * size.y * size.z) * bytes);
+  for (int64_t z = 0; z < valid.z; ++z)
+    for (int64_t y = 0; y < valid.y; ++y)
+      for (int64_t x = 0; x < valid.x; ++x)
+        std::memcpy(out + static_cast<size_t>(voxel_index({x, y, z}, size)) * bytes,
+                    voxels.row(y, z) + static_cast<size_t>(x) * bytes, bytes);
+}
+
+}  // namespace voxkit::svmm

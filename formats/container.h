@@ -1,0 +1,103 @@
+// The one file layout of every codec: a header, chunks, a table of chunks. Specified in FORMAT.md, section 1.
+#pragma once
+
+#include <array>
+#include <atomic>
+#include <cstddef>
+#include <cstdint>
+#include <functional>
+#include <memory>
+#include <span>
+#include <string>
+#include <vector>
+
+#include "formats/context.h"
+#include "formats/result.h"
+#include "formats/volume.h"
+
+namespace voxkit {
+
+inline constexpr std::array<uint8_t, 8> container_magic = {0x89, 'V', 'O', 'X', '\r', '\n', 0x1A, '\n'};
+inline constexpr uint16_t container_version = 1;
+
+enum class Codec : uint16_t { svmm = 1 };
+
+/// Four letters, as they stand in the file.
+constexpr uint32_t chunk_kind(const char (&letters)[5]) {
+  return static_cast<uint32_t>(static_cast<unsigned char>(letters[0])) |
+         static_cast<uint32_t>(static_cast<unsigned char>(letters[1])) << 8 |
+         static_cast<uint32_t>(static_cast<unsigned char>(letters[2])) << 16 |
+         static_cast<uint32_t>(static_cast<unsigned char>(letters[3])) << 24;
+}
+
+/// A row of the chunk table. Chunks are told apart by (kind, index, part).
+struct ChunkEntry {
+  uint32_t kind = 0;
+  uint32_t index = 0;  ///< a level, say
+  uint64_t part = 0;   ///< running number within (kind, index)
+  uint64_t offset = 0, length = 0;
+  uint64_t checksum = 0;  ///< XXH64, seed 0, of the chunk's bytes
+};
+
+/// Where a writer's bytes go, in order.
+using ByteSink = std::function<Status(std::span<const std::byte>)>;
+
+/// Writes a container front to back, so that it can go to a pipe: the table comes last.
+class ContainerWriter {
+ public:
+  ContainerWriter(ByteSink sink, Codec codec) : sink_(std::move(sink)), codec_(codec) {}
+  Status add(uint32_t kind, uint32_t index, uint64_t part, std::span<const std::byte> bytes);
+  /// Writes the table and the trailer. Nothing may follow.
+  Status finish();
+  uint64_t bytes_written() const { return position_; }
+
+ private:
+  Status begin();
+  Status write(std::span<const std::byte> bytes);
+  Status pad();
+
+  ByteSink sink_;
+  Codec codec_;
+  uint64_t position_ = 0;
+  std::vector<ChunkEntry> table_;
+};
+
+/// A container in memory (mapped, as a rule). Safe on any bytes: opening validates header, trailer and table
+/// against the bytes that are there; a chunk's checksum is verified when the chunk is first asked for.
+class Container {
+ public:
+  /// `keep_alive` owns `bytes`. `name` is for messages.
+  static Result<std::shared_ptr<const Container>> open(std::span<const std::byte> bytes, std::string name,
+                                                       std::shared_ptr<const void> keep_alive);
+  Codec codec() const { return codec_; }
+  const std::string& name() const { return name_; }
+  uint64_t file_bytes() const { return bytes_.size(); }
+  /// In file order.
+  const std::vector<ChunkEntry>& table() const { return table_; }
+  /// The bytes of the i-th chunk, or ErrorCode::input if they do not match their checksum. Thread-safe.
+  Result<std::span<const std::byte>> chunk(size_t i) const;
+  /// The bytes of the only chunk of this kind; ErrorCode::input if there is none, or more than one.
+  Result<std::span<const std::byte>> only_chunk(uint32_t kind) const;
+  /// Number of chunks whose bytes have been looked at so far.
+  uint64_t chunks_touched() const { return touched_; }
+
+ private:
+  Container() = default;
+  std::span<const std::byte> bytes_;
+  std::string name_;
+  std::shared_ptr<const void> keep_alive_;
+  Codec codec_{};
+  std::vector<ChunkEntry> table_;
+  mutable std::unique_ptr<std::atomic<bool>[]> verified_;
+  mutable std::atomic<uint64_t> touched_{0};
+};
+
+/// True if the bytes begin like a container.
+bool is_container(std::span<const std::byte> bytes);
+
+/// The 'VOLI' chunk, common to all codecs of volumes.
+inline constexpr uint32_t volume_info_kind = chunk_kind("VOLI");
+std::vector<std::byte> pack_volume_info(const VolumeInfo& info);
+Result<VolumeInfo> unpack_volume_info(std::span<const std::byte> bytes, const std::string& file);
+
+}  // namespace voxkit

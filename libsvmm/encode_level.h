@@ -1,0 +1,178 @@
+// Encoding of blocks and groups of blocks of one level: `EncodeBlock` and `EncodeLevel` of thesis
+// sections 2.2.3, 2.2.4.
+#pragma once
+
+#include <vector>
+
+#include "libsvmm/base_block.h"
+#include "libsvmm/layout.h"
+#include "libsvmm/moments.h"
+
+namespace voxkit::svmm {
+
+/// An equivalent voxel while its level is being made.
+template <VoxelFormat F>
+struct Node {
+  Moments<F> moments;  ///< of the original voxels it stands for; count 0: outside the volume
+  Voxel value;         ///< their average, as it will be decoded
+  uint64_t block = 0;  ///< of the block below; meaningful if not terminal
+  bool terminal = true;
+};
+
+/// The stored blocks of one level, in order. Block numbers, and links to them, count from the buffer's own
+/// start until they are committed to the file.
+struct BlockBuffer {
+  std::vector<std::byte> bytes;
+  uint64_t blocks = 0;
+  uint64_t terminal_voxels = 0;
+};
+
+/// A dense grid of nodes, x fastest. What lies outside it is outside the volume.
+template <VoxelFormat F>
+struct NodeGrid {
+  Index3 size{0};
+  std::vector<Node<F>> nodes;
+
+  void reset(Index3 new_size) {
+    size = new_size;
+    nodes.assign(static_cast<size_t>(size.x * size.y * size.z), {});
+  }
+  Node<F>& at(Index3 v) { return nodes[static_cast<size_t>((v.z * size.y + v.y) * size.x + v.x)]; }
+  const Node<F>* find(Index3 v) const {
+    if (v.x >= size.x || v.y >= size.y || v.z >= size.z) return nullptr;
+    return &nodes[static_cast<size_t>((v.z * size.y + v.y) * size.x + v.x)];
+  }
+};
+
+/// Appends the values and links of the block of `size` nodes at `lo` of `grid`; returns its terminal voxels.
+template <VoxelFormat F>
+uint64_t write_structural_block(const NodeGrid<F>& grid, Index3 lo, Index3 size, Layout layout,
+                                std::vector<std::byte>& out) {
+  const int64_t voxels = size.x * size.y * size.z;
+  const size_t start = out.size();
+  out.resize(start + structural_block_bytes(static_cast<uint64_t>(voxels), F, layout));
+  std::byte* const values = &out[start];
+  std::byte* const links = values + voxels * value_bytes(F);
+  uint64_t terminal_voxels = 0;
+  int64_t s = 0;
+  for (int64_t z = 0; z < size.z; z += 2)
+    for (int64_t y = 0; y < size.y; y += 2)
+      for (int64_t x = 0; x < size.x; x += 2, ++s) {
+        Link link;
+        Voxel subblock[8];
+        for (int i = 0; i < 8; ++i) {
+          const Node<F>* node = grid.find(lo + Index3(x + (i & 1), y + (i >> 1 & 1), z + (i >> 2)));
+          if (!node || node->moments.count == 0) continue;
+          subblock[i] = node->value;
+          terminal_voxels += node->terminal;
+          if (node->terminal) continue;
+          if (link.mask == 0) link.first = node->block;
+          link.mask = static_cast<uint8_t>(link.mask | 1u << i);
+        }
+        if (layout == Layout::plain) {
+          for (int i = 0; i < 8; ++i)
+            std::memcpy(values + (s * 8 + i) * value_bytes(F), subblock[i].bytes.data(),
+                        static_cast<size_t>(value_bytes(F)));
+          store_le(links + s * 8, pack_link(link));
+        } else {
+          for (int i = 0; i < 8; ++i)
+            store_word(values + (s * 8 + i) * word_bytes(F), F, thesis_word(subblock[i], F, link, i));
+        }
+      }
+  return terminal_voxels;
+}
+
+/// Adds `base` to every link of structural blocks, whose children were numbered from 0.
+void relocate_links(std::byte* blocks, uint64_t count, Index3 size, VoxelFormat f, Layout layout,
+                    uint64_t base);
+
+/// Encodes the block of w^3 nodes at `lo` of level >= 1 and returns its equivalent voxel.
+template <VoxelFormat F>
+Node<F> encode_block(const NodeGrid<F>& grid, Index3 lo, int w, const Criterion& criterion,
+                     BlockBuffer& out) {
+  Node<F> parent;
+  bool all_terminal = true;
+  for (int64_t z = lo.z; z < std::min(lo.z + w, grid.size.z); ++z)
+    for (int64_t y = lo.y; y < std::min(lo.y + w, grid.size.y); ++y)
+      for (int64_t x = lo.x; x < std::min(lo.x + w, grid.size.x); ++x) {
+        const Node<F>& node = *grid.find({x, y, z});
+        if (node.moments.count == 0) continue;
+        parent.moments.add(node.moments);
+        all_terminal &= node.terminal;
+      }
+  if (parent.moments.count == 0) return parent;
+  parent.value = parent.moments.value(criterion);
+  bool homogeneous = all_terminal && (!criterion.global || parent.moments.within(parent.value, criterion));
+  if (homogeneous && !criterion.global)
+    for (int64_t z = lo.z; z < std::min(lo.z + w, grid.size.z) && homogeneous; ++z)
+      for (int64_t y = lo.y; y < std::min(lo.y + w, grid.size.y) && homogeneous; ++y)
+        for (int64_t x = lo.x; x < std::min(lo.x + w, grid.size.x) && homogeneous; ++x) {
+          const Node<F>& node = *grid.find({x, y, z});
+          const Voxel decoded = decoded_value(node.value, F);
+          homogeneous =
+              node.moments.count == 0 || Moments<F>::near(decoded.bytes.data(), parent.value, criterion);
+        }
+  if (homogeneous) return parent;
+  parent.terminal = false;
+  parent.block = out.blocks++;
+  out.terminal_voxels += write_structural_block(grid, lo, Index3(w), criterion.layout, out.bytes);
+  return parent;
+}
+
+/// Copies the voxels of a block of extent `size`, of which `valid` lie inside the volume, to block order; the
+/// rest is zero.
+void gather_block(ConstVoxelSpan voxels, Index3 size, Index3 valid, VoxelFormat f, std::byte* out);
+
+/// Whether all voxels of a box of that size are the same, byte for byte.
+template <int Bytes>
+bool all_equal(ConstVoxelSpan voxels, Index3 size) {
+  const std::byte* first = voxels.data;
+  const size_t row_bytes = static_cast<size_t>(size.x) * Bytes;
+  // The first row equals itself shifted by a voxel; every row equals the first.
+  if (std::memcmp(first, first + Bytes, row_bytes - Bytes) != 0) return false;
+  for (int64_t z = 0; z < size.z; ++z)
+    for (int64_t y = 0; y < size.y; ++y)
+      if (std::memcmp(voxels.row(y, z), first, row_bytes) != 0) return false;
+  return true;
+}
+
+/// Encodes the block of w^3 voxels of the base level at `voxels`, of which `valid` lie inside the volume (at
+/// least one), and returns its equivalent voxel. `scratch` holds w^3 voxels.
+template <VoxelFormat F>
+Node<F> encode_base_block(ConstVoxelSpan voxels, Index3 valid, int w, const Params& params,
+                          const Criterion& criterion, std::vector<std::byte>& scratch, BlockBuffer& out) {
+  constexpr int bytes = voxel_bytes(F);
+  Node<F> parent;
+  const uint64_t count = static_cast<uint64_t>(valid.x * valid.y * valid.z);
+  if (all_equal<bytes>(voxels, valid)) {
+    Voxel v;
+    std::memcpy(v.bytes.data(), voxels.data, bytes);
+    parent.moments.add_uniform(v, count, criterion);
+  } else {
+    for (int64_t z = 0; z < valid.z; ++z)
+      for (int64_t y = 0; y < valid.y; ++y) {
+        const std::byte* row = voxels.row(y, z);
+        for (int64_t x = 0; x < valid.x; ++x) parent.moments.add(row + x * bytes, criterion);
+      }
+  }
+  parent.value = parent.moments.value(criterion);
+  bool homogeneous = parent.moments.within(parent.value, criterion);
+  if (!homogeneous && is_colour(F)) {  // the box of values is too wide, but perhaps no voxel is in its corner
+    homogeneous = true;
+    for (int64_t z = 0; z < valid.z && homogeneous; ++z)
+      for (int64_t y = 0; y < valid.y && homogeneous; ++y) {
+        const std::byte* row = voxels.row(y, z);
+        for (int64_t x = 0; x < valid.x && homogeneous; ++x)
+          homogeneous = Moments<F>::near(row + x * bytes, parent.value, criterion);
+      }
+  }
+  if (homogeneous) return parent;
+  parent.terminal = false;
+  parent.block = out.blocks++;
+  out.terminal_voxels += count;
+  gather_block(voxels, Index3(w), valid, F, scratch.data());
+  encode_base_block(scratch.data(), Index3(w), F, params.base, params.layout, out.bytes);
+  return parent;
+}
+
+}  // namespace voxkit::svmm

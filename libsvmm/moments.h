@@ -1,0 +1,211 @@
+// What the encoder knows about a set of original voxels: how many, their sums, and their least and greatest
+// value. Averages are formed once, from these exact sums, and rounded once (thesis section 2.1; FORMAT.md,
+// section 2.4).
+#pragma once
+
+#include <algorithm>
+#include <bit>
+#include <cmath>
+#include <cstdint>
+
+#include "formats/volume.h"
+#include "libsvmm/layout.h"
+
+namespace voxkit::svmm {
+
+/// The homogeneity test in units of stored values, and how averages are formed.
+struct Criterion {
+  Criterion(const Params& params, VoxelFormat f) {
+    // The thesis expands a density d to (d, d, d, d), whose distances are twice as large.
+    const double spread = params.layout == Layout::thesis && !is_colour(f) ? 2 : 1;
+    distance = params.delta * params.full_scale / spread;
+    squared = static_cast<int64_t>(std::min(std::floor(distance * distance), 4.0 * 255 * 255));
+    scalar = static_cast<int64_t>(std::min(std::floor(distance), 65535.0));
+    layout = params.layout;
+    alpha_weight = params.alpha_weight && f == VoxelFormat::rgba32;
+    global = params.bound == Bound::global;
+  }
+  double distance;  ///< greatest distance allowed, in stored units
+  int64_t squared;  ///< its square, rounded down (colours)
+  int64_t scalar;   ///< itself, rounded down (integer scalars)
+  Layout layout;
+  bool alpha_weight, global;
+};
+
+/// Rounded to nearest, halves up.
+inline uint64_t rounded_quotient(uint64_t a, uint64_t b) {
+  return (a + b / 2) / b;
+}
+
+template <VoxelFormat F>
+struct Moments;
+
+/// RGBA32 and RGB24.
+template <VoxelFormat F>
+requires(is_colour(F)) struct Moments<F> {
+  static constexpr int channels = attributes(F);
+  uint64_t count = 0;
+  uint64_t sum[3] = {};  ///< of the colours, each times its alpha if alpha_weight
+  uint64_t alpha = 0;    ///< sum of alphas
+  uint8_t lo[channels], hi[channels];
+
+  Moments() {
+    std::fill(lo, lo + channels, uint8_t{255});
+    std::fill(hi, hi + channels, uint8_t{0});
+  }
+  void add(const std::byte* v, const Criterion& criterion) {
+    uint8_t c[4];
+    std::memcpy(c, v, channels);
+    const uint32_t weight = criterion.alpha_weight ? c[3] : 1u;
+    ++count;
+    for (int k = 0; k < 3; ++k) sum[k] += c[k] * weight;
+    if constexpr (channels == 4) alpha += c[3];
+    for (int k = 0; k < channels; ++k) lo[k] = std::min(lo[k], c[k]), hi[k] = std::max(hi[k], c[k]);
+  }
+  void add(const Moments& m) {
+    count += m.count;
+    for (int k = 0; k < 3; ++k) sum[k] += m.sum[k];
+    alpha += m.alpha;
+    for (int k = 0; k < channels; ++k) lo[k] = std::min(lo[k], m.lo[k]), hi[k] = std::max(hi[k], m.hi[k]);
+  }
+  void add_uniform(const Voxel& v, uint64_t n, const Criterion& criterion) {
+    Moments one;
+    one.add(v.bytes.data(), criterion);
+    for (int k = 0; k < 3; ++k) one.sum[k] *= n;
+    one.alpha *= n;
+    one.count = n;
+    add(one);
+  }
+  bool uniform() const { return std::equal(lo, lo + channels, hi); }
+  /// The average as it will be decoded.
+  Voxel value(const Criterion& criterion) const {
+    Voxel v;
+    if (uniform()) {
+      std::memcpy(v.bytes.data(), lo, channels);
+    } else {
+      const uint64_t weight = criterion.alpha_weight ? alpha : count;
+      for (int k = 0; k < 3; ++k)
+        v.bytes[static_cast<size_t>(k)] =
+            static_cast<std::byte>(weight ? rounded_quotient(sum[k], weight) : 0);
+      if constexpr (channels == 4) v.bytes[3] = static_cast<std::byte>(rounded_quotient(alpha, count));
+    }
+    if constexpr (channels == 4)
+      if (criterion.layout == Layout::thesis)
+        v.bytes[3] =
+            static_cast<std::byte>(alpha_from_3_bits(alpha_to_3_bits(std::to_integer<int>(v.bytes[3]))));
+    return v;
+  }
+  /// Whether every voxel within [lo, hi] is near enough to `v`: sufficient for the voxels themselves.
+  bool within(const Voxel& v, const Criterion& criterion) const {
+    int64_t squared = 0;
+    for (int k = 0; k < channels; ++k) {
+      const int64_t a = std::to_integer<int>(v.bytes[static_cast<size_t>(k)]),
+                    far = std::max(a - lo[k], hi[k] - a);
+      squared += far * far;
+    }
+    return squared <= criterion.squared;
+  }
+  static bool near(const std::byte* voxel, const Voxel& v, const Criterion& criterion) {
+    int squared = 0;
+    for (int k = 0; k < channels; ++k) {
+      const int d = std::to_integer<int>(voxel[k]) - std::to_integer<int>(v.bytes[static_cast<size_t>(k)]);
+      squared += d * d;
+    }
+    return squared <= criterion.squared;
+  }
+};
+
+/// DENSITY8, DENSITY16 and BITMAP. A BITMAP average is its coverage, 0..255.
+template <VoxelFormat F>
+requires(F == VoxelFormat::density8 || F == VoxelFormat::density16 ||
+         F == VoxelFormat::bitmap) struct Moments<F> {
+  using Value = std::conditional_t<F == VoxelFormat::density16, uint16_t, uint8_t>;
+  uint64_t count = 0, sum = 0;
+  Value lo = static_cast<Value>(-1), hi = 0;
+
+  static Value load(const std::byte* v) { return load_le<Value>(v); }
+  void add(const std::byte* v, const Criterion&) {
+    const Value x = load(v);
+    ++count;
+    sum += x;
+    lo = std::min(lo, x);
+    hi = std::max(hi, x);
+  }
+  void add(const Moments& m) {
+    count += m.count;
+    sum += m.sum;
+    lo = std::min(lo, m.lo);
+    hi = std::max(hi, m.hi);
+  }
+  void add_uniform(const Voxel& v, uint64_t n, const Criterion&) {
+    const Value x = load(v.bytes.data());
+    add(Moments{n, x * n, x, x});
+  }
+  bool uniform() const { return lo == hi; }
+  Voxel value(const Criterion&) const {
+    return Voxel::of(static_cast<Value>(rounded_quotient(F == VoxelFormat::bitmap ? sum * 255 : sum, count)));
+  }
+  bool within(const Voxel& v, const Criterion& criterion) const {
+    const int64_t a = decoded_value(v, F).template as<Value>();
+    return std::max(a - lo, hi - a) <= criterion.scalar;
+  }
+  static bool near(const std::byte* voxel, const Voxel& v, const Criterion& criterion) {
+    return std::abs(int64_t{load(voxel)} - int64_t{decoded_value(v, F).template as<Value>()}) <=
+           criterion.scalar;
+  }
+};
+
+/// FLOAT32. Sums are over finite voxels, in double, in block order. lo and hi are keys that order all bit
+/// patterns, so that "all equal" means equal bit for bit: -0, +0 and every NaN are told apart. A block with
+/// NaN or infinity is homogeneous only if all its voxels are equal.
+template <>
+struct Moments<VoxelFormat::float32> {
+  uint64_t count = 0, finite = 0;
+  double sum = 0;
+  uint32_t lo = ~uint32_t{0}, hi = 0;
+
+  static uint32_t key(float x) {
+    const auto bits = std::bit_cast<uint32_t>(x);
+    return bits & 0x80000000u ? ~bits : bits | 0x80000000u;
+  }
+  static float from_key(uint32_t k) { return std::bit_cast<float>(k & 0x80000000u ? k & 0x7fffffffu : ~k); }
+  void add(const std::byte* v, const Criterion&) {
+    const float x = load_le<float>(v);
+    ++count;
+    if (std::isfinite(x)) ++finite, sum += static_cast<double>(x);
+    lo = std::min(lo, key(x));
+    hi = std::max(hi, key(x));
+  }
+  void add(const Moments& m) {
+    count += m.count;
+    finite += m.finite;
+    sum += m.sum;
+    lo = std::min(lo, m.lo);
+    hi = std::max(hi, m.hi);
+  }
+  void add_uniform(const Voxel& v, uint64_t n, const Criterion&) {
+    const float x = v.as<float>();
+    const bool is_finite = std::isfinite(x);
+    add(Moments{n, is_finite ? n : 0, is_finite ? static_cast<double>(x) * static_cast<double>(n) : 0, key(x),
+                key(x)});
+  }
+  bool uniform() const { return lo == hi; }
+  Voxel value(const Criterion&) const {
+    if (uniform()) return Voxel::of(from_key(lo));
+    return Voxel::of(finite ? static_cast<float>(sum / static_cast<double>(finite)) : from_key(hi));
+  }
+  bool within(const Voxel& v, const Criterion& criterion) const {
+    if (uniform()) return true;
+    const double a = v.as<float>(), least = from_key(lo), greatest = from_key(hi);
+    return criterion.distance > 0 && std::isfinite(least) && std::isfinite(greatest) &&
+           std::max(a - least, greatest - a) <= criterion.distance;
+  }
+  static bool near(const std::byte* voxel, const Voxel& v, const Criterion& criterion) {
+    const float x = load_le<float>(voxel), a = v.as<float>();
+    if (std::bit_cast<uint32_t>(x) == std::bit_cast<uint32_t>(a)) return true;
+    return criterion.distance > 0 && std::isfinite(x) && std::isfinite(a) &&
+           std::abs(static_cast<double>(x) - static_cast<double>(a)) <= criterion.distance;
+  }
+};
+
+}  // namespace voxkit::svmm
