@@ -316,7 +316,7 @@ SinkResult create_nrrd(const std::string& path, const VolumeInfo& info, bool for
   SampleLayout layout = storage_layout(info);
   if (info.format == VoxelFormat::bitmap) layout.type = SampleType::u8;
   const fs::path name(path);
-  const bool detached = nrrd::lower(name.extension().string()) == ".nhdr";
+  const bool detached = has_ending(path, ".nhdr");
   VOX_TRY(auto file, OutputFile::create(path, force));
   const std::string data_name = detached ? name.stem().string() + ".raw" : std::string();
   VOX_CHECK(file->write(nrrd::header_text(info, layout, data_name)));

@@ -3,6 +3,7 @@
 
 #include <memory>
 #include <string>
+#include <string_view>
 
 #include "formats/context.h"
 #include "formats/input_stream.h"
@@ -15,6 +16,9 @@ namespace voxkit {
 using SourceResult = Result<std::unique_ptr<VolumeSource>>;
 using SinkResult = Result<std::unique_ptr<VolumeSink>>;
 
+/// open_volume.cc: whether a name ends so, in letters of any case; `ending` is in lower case.
+bool has_ending(std::string_view name, std::string_view ending);
+
 // nrrd.cc: http://teem.sourceforge.net/nrrd/format.html. Attached (.nrrd, or a stream) and detached (.nhdr) headers; raw, gzip, bzip2
 // and ascii data; both endians; every integer and floating type; 3 axes of scalars, or 4 with 3 or 4 u8 components first.
 SourceResult open_nrrd(const std::string& path, Context& ctx);
@@ -26,7 +30,8 @@ SinkResult create_nrrd(const std::string& path, const VolumeInfo& info, bool for
 SourceResult open_raw(const std::string& path, const OpenOptions& options, Context& ctx);
 SinkResult create_raw(const std::string& path, const VolumeInfo& info, bool force, Context& ctx);
 
-// nifti.cc: NIfTI-1 single files, .nii and .nii.gz (header by niftiio, voxels streamed or mapped).
+// nifti.cc: NIfTI-1 and NIfTI-2 single files, .nii and .nii.gz, one time step (header by niftiio, voxels streamed or mapped).
+// Written as NIfTI-1: sides up to 32767.
 SourceResult open_nifti(const std::string& path, Context& ctx);
 SinkResult create_nifti(const std::string& path, const VolumeInfo& info, bool force, Context& ctx);
 
