@@ -13,7 +13,7 @@
 namespace voxkit {
 namespace {
 
-constexpr Index3 tile_size{512, 64, 0};
+constexpr Index3 tile_size{512, 64, 32};
 constexpr int64_t cube = 32;
 
 int64_t divide_up(int64_t a, int64_t b) {
@@ -92,17 +92,15 @@ Box Slabs::slab(int64_t index) const {
 }
 
 int64_t Slabs::tiles(const Box& slab) {
-  return divide_up(slab.size().x, tile_size.x) * divide_up(slab.size().y, tile_size.y);
+  const Index3 size = slab.size();
+  return divide_up(size.x, tile_size.x) * divide_up(size.y, tile_size.y) * divide_up(size.z, tile_size.z);
 }
 
 Box Slabs::tile(const Box& slab, int64_t index) {
-  const int64_t across = divide_up(slab.size().x, tile_size.x);
-  Box tile = slab;
-  tile.lo.x += index % across * tile_size.x;
-  tile.lo.y += index / across * tile_size.y;
-  tile.hi.x = std::min(slab.hi.x, tile.lo.x + tile_size.x);
-  tile.hi.y = std::min(slab.hi.y, tile.lo.y + tile_size.y);
-  return tile;
+  const Index3 size = slab.size();
+  const int64_t across = divide_up(size.x, tile_size.x), up = divide_up(size.y, tile_size.y);
+  const Index3 lo = slab.lo + Index3(index % across, index / across % up, index / across / up) * tile_size;
+  return intersect({lo, lo + tile_size}, slab);
 }
 
 uint64_t slab_target(const Context& ctx) {

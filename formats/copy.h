@@ -27,7 +27,7 @@ class Slabs {
   /// Bytes that hold the largest slab.
   uint64_t bytes() const { return bytes_; }
 
-  /// Tiles of a slab: up to 512 x 64 voxels, as thick as the slab, y ascending, then x.
+  /// Tiles of a slab: up to 512 x 64 x 32 voxels, ordered by z, then y, then x.
   static int64_t tiles(const Box& slab);
   static Box tile(const Box& slab, int64_t index);
 
