@@ -117,9 +117,6 @@ class Reservation {
 Index3 min3(Index3 a, Index3 b) {
   return {std::min(a.x, b.x), std::min(a.y, b.y), std::min(a.z, b.z)};
 }
-Index3 max3(Index3 a, Index3 b) {
-  return {std::max(a.x, b.x), std::max(a.y, b.y), std::max(a.z, b.z)};
-}
 
 template <VoxelFormat F>
 class Encoder {
@@ -267,10 +264,12 @@ class Encoder {
     });
     for (size_t k = 1; k <= tile_level_; ++k) {
       const int w = static_cast<int>(levels_[k].blockwidth);
+      const Index3 level_size =
+          min3(nodes->size, levels_[k].dims - lo / Index3(static_cast<int64_t>(levels_[k].mip_factor)));
       NodeGrid<F>* parents = &(k == tile_level_ ? tile.nodes : grids[k % 2]);
       parents->reset(nodes->size / Index3(w));
       for_each_block(parents->size, [&](Index3 b) {
-        parents->at(b) = encode_block(*nodes, b * int64_t{w}, w, criterion_, tile.levels[k]);
+        parents->at(b) = encode_block(*nodes, b * int64_t{w}, level_size, w, criterion_, tile.levels[k]);
       });
       nodes = parents;
     }
@@ -281,6 +280,8 @@ class Encoder {
   bool uniform_tile(const Box& box, int64_t half, Tile& tile) {
     const auto value = source_.uniform(box);
     if (!value) return false;
+    // Layout thesis sees void beside a tile that sticks out of the volume.
+    if (params_.layout == Layout::thesis && box.size() != Index3(2 * half) && *value != Voxel{}) return false;
     for (int i = 0; i < 8; ++i) {
       const Index3 v{i & 1, i >> 1 & 1, i >> 2};
       const Box part = intersect({box.lo + v * half, box.lo + (v + Index3(1)) * half}, box);
@@ -353,8 +354,8 @@ class Encoder {
       for (int64_t x = 0; x < parent_dims.x; x += 2)
         for (int i = 0; i < 8; ++i) {
           const Index3 b{x + (i & 1), 2 * row + (i >> 1 & 1), i >> 2};
-          parents.at(b) =
-              encode_block(slab, b * w, static_cast<int>(w), criterion_, results[static_cast<size_t>(row)]);
+          parents.at(b) = encode_block(slab, b * w, slab.size, static_cast<int>(w), criterion_,
+                                       results[static_cast<size_t>(row)]);
         }
       return Status{};
     }));

@@ -86,16 +86,22 @@ uint64_t write_structural_block(const NodeGrid<F>& grid, Index3 lo, Index3 size,
 void relocate_links(std::byte* blocks, uint64_t count, Index3 size, VoxelFormat f, Layout layout,
                     uint64_t base);
 
-/// Encodes the block of w^3 nodes at `lo` of level >= 1 and returns its equivalent voxel.
+/// Encodes the block of w^3 nodes at `lo` of level >= 1 and returns its equivalent voxel. `level_size` is
+/// what the grid can hold of the level, whose sides are rounded up to even: layout thesis takes nodes within
+/// it, but outside the volume, for void voxels that must be near enough as well (the published sizes say so);
+/// their weight in averages is zero all the same.
 template <VoxelFormat F>
-Node<F> encode_block(const NodeGrid<F>& grid, Index3 lo, int w, const Criterion& criterion,
+Node<F> encode_block(const NodeGrid<F>& grid, Index3 lo, Index3 level_size, int w, const Criterion& criterion,
                      BlockBuffer& out) {
   Node<F> parent;
-  bool all_terminal = true;
-  for (int64_t z = lo.z; z < std::min(lo.z + w, grid.size.z); ++z)
-    for (int64_t y = lo.y; y < std::min(lo.y + w, grid.size.y); ++y)
-      for (int64_t x = lo.x; x < std::min(lo.x + w, grid.size.x); ++x) {
+  bool all_terminal = true, padding = false;
+  const Index3 hi{std::min(lo.x + w, level_size.x), std::min(lo.y + w, level_size.y),
+                  std::min(lo.z + w, level_size.z)};
+  for (int64_t z = lo.z; z < hi.z; ++z)
+    for (int64_t y = lo.y; y < hi.y; ++y)
+      for (int64_t x = lo.x; x < hi.x; ++x) {
         const Node<F>& node = *grid.find({x, y, z});
+        padding |= node.moments.count == 0;
         if (node.moments.count == 0) continue;
         parent.moments.add(node.moments);
         all_terminal &= node.terminal;
@@ -103,10 +109,12 @@ Node<F> encode_block(const NodeGrid<F>& grid, Index3 lo, int w, const Criterion&
   if (parent.moments.count == 0) return parent;
   parent.value = parent.moments.value(criterion);
   bool homogeneous = all_terminal && (!criterion.global || parent.moments.within(parent.value, criterion));
+  if (padding && criterion.layout == Layout::thesis)
+    homogeneous &= Moments<F>::near(Voxel{}.bytes.data(), parent.value, criterion);
   if (homogeneous && !criterion.global)
-    for (int64_t z = lo.z; z < std::min(lo.z + w, grid.size.z) && homogeneous; ++z)
-      for (int64_t y = lo.y; y < std::min(lo.y + w, grid.size.y) && homogeneous; ++y)
-        for (int64_t x = lo.x; x < std::min(lo.x + w, grid.size.x) && homogeneous; ++x) {
+    for (int64_t z = lo.z; z < hi.z && homogeneous; ++z)
+      for (int64_t y = lo.y; y < hi.y && homogeneous; ++y)
+        for (int64_t x = lo.x; x < hi.x && homogeneous; ++x) {
           const Node<F>& node = *grid.find({x, y, z});
           const Voxel decoded = decoded_value(node.value, F);
           homogeneous =
