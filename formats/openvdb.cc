@@ -1,1 +1,540 @@
+// OpenVDB files: sparse grids of floats (densities) and of Vec3s (colours).
+#include <fmt/format.h>
+#include <openvdb/io/Archive.h>
+#include <openvdb/io/GridDescriptor.h>
+#include <openvdb/openvdb.h>
 
+#include <cmath>
+#include <fstream>
+#include <mutex>
+#include <vector>
+
+#include "formats/module.h"
+
+namespace voxkit {
+namespace {
+
+using openvdb::Coord;
+
+/// Extent that our writer states, since the box of the active voxels leaves out empty borders: x, y, z from
+/// (0, 0, 0).
+constexpr const char* dims_key = "voxkit_dims";
+
+std::string one_line(const std::string& text) {
+  return text.substr(0, text.find('\n'));
+}
+
+/// Only what is read here is registered. Metadata of other types stay bytes, so that no library code
+/// interprets them.
+void register_types() {
+  static std::once_flag once;
+  std::call_once(once, [] {
+    namespace math = openvdb::math;
+    math::MapRegistry::registerMap(math::AffineMap::mapType(), math::AffineMap::create);
+    math::MapRegistry::registerMap(math::UnitaryMap::mapType(), math::UnitaryMap::create);
+    math::MapRegistry::registerMap(math::ScaleMap::mapType(), math::ScaleMap::create);
+    math::MapRegistry::registerMap(math::UniformScaleMap::mapType(), math::UniformScaleMap::create);
+    math::MapRegistry::registerMap(math::TranslationMap::mapType(), math::TranslationMap::create);
+    math::MapRegistry::registerMap(math::ScaleTranslateMap::mapType(), math::ScaleTranslateMap::create);
+    math::MapRegistry::registerMap(math::UniformScaleTranslateMap::mapType(),
+                                   math::UniformScaleTranslateMap::create);
+    openvdb::FloatGrid::registerGrid();
+    openvdb::Vec3SGrid::registerGrid();
+    openvdb::Vec3IMetadata::registerType();
+  });
+}
+
+// ---------------------------------------------------------------------------------------------- the file's
+// structure
+
+/// A grid as the file announces it.
+struct GridEntry {
+  std::string name, type, parent;
+  int64_t descriptor = 0, start = 0, end = 0;  ///< byte offsets
+  int64_t memory = 0;                          ///< what its writer measured; 0 where not stated
+  bool is(const char* tree) const { return type == tree || type == std::string(tree) + "_HalfFloat"; }
+  bool is_float() const { return is("Tree_float_5_4_3"); }
+  bool is_vec3s() const { return is("Tree_vec3s_5_4_3"); }
+};
+
+/// OpenVDB trusts the lengths in a file. So they are walked through here first: a stream that throws at the
+/// end of the file, and no length taken that exceeds the bytes that follow.
+class Walker {
+ public:
+  Walker(std::istream& stream, int64_t size) : stream_(stream), size_(size) {}
+
+  Result<std::vector<GridEntry>> grids(const std::string& path) {
+    stream_.seekg(0);
+    if (number<int64_t>() != openvdb::OPENVDB_MAGIC)
+      return bad_input(path, "not an OpenVDB file: expected its magic number at byte 0");
+    const uint32_t version = number<uint32_t>();
+    if (version < openvdb::OPENVDB_FILE_VERSION_NODE_MASK_COMPRESSION)
+      return bad_input(path, fmt::format("OpenVDB file version {}: expected 222 or later", version));
+    skip(8);  // library version
+    const bool offsets = number<char>() != 0;
+    skip(36);  // UUID
+    metadata(nullptr);
+    const int32_t count = number<int32_t>();
+    std::vector<GridEntry> entries;
+    for (int32_t i = 0; i < count; ++i) {
+      GridEntry entry;
+      entry.descriptor = stream_.tellg();
+      entry.name = text();
+      entry.name = entry.name.substr(0, entry.name.find('\x1e'));  // what follows numbers grids of one name
+      entry.type = text();
+      entry.parent = text();
+      entry.start = number<int64_t>();
+      skip(8);
+      entry.end = number<int64_t>();
+      const int64_t here = stream_.tellg();
+      if (!offsets) entry.start = here, entry.end = size_;
+      if (entry.start < here || entry.end < entry.start || entry.end > size_)
+        return bad_input(
+            path, fmt::format("grid {} spans bytes {} to {}: expected {} to at most {}, the file's size",
+                              entry.name, entry.start, entry.end, here, size_));
+      stream_.seekg(entry.start);
+      skip(4);  // compression
+      metadata(&entry.memory);
+      text();  // type of the transform
+      stream_.seekg(entry.end);
+      entries.push_back(std::move(entry));
+      if (!offsets) break;  // written to a stream: no way to the next grid but through this one
+    }
+    return entries;
+  }
+
+ private:
+  template <class T>
+  T number() {
+    T value;
+    stream_.read(reinterpret_cast<char*>(&value), sizeof value);
+    return value;
+  }
+  void skip(int64_t bytes) {
+    if (bytes > size_ - stream_.tellg()) throw std::ios_base::failure("length exceeds the file");
+    stream_.seekg(bytes, std::ios_base::cur);
+  }
+  std::string text() {
+    const uint32_t length = number<uint32_t>();
+    if (length > size_ - stream_.tellg()) throw std::ios_base::failure("length exceeds the file");
+    std::string value(length, '\0');
+    if (length) stream_.read(value.data(), length);
+    return value;
+  }
+  /// Names, types and values, of which only the grid's size in memory is of use.
+  void metadata(int64_t* memory) {
+    for (uint32_t count = number<uint32_t>(); count > 0; --count) {
+      const std::string key = text(), type = text();
+      const uint32_t length = number<uint32_t>();
+      if (memory && key == "file_mem_bytes" && type == "int64" && length == 8)
+        *memory = number<int64_t>();
+      else
+        skip(length);
+    }
+  }
+
+  std::istream& stream_;
+  int64_t size_;
+};
+
+/// io::File hides its streams, and with them what goes wrong on them: a short read yields zeros and a full
+/// disk a cut file.
+class Archive : public openvdb::io::Archive {
+ public:
+  openvdb::GridBase::Ptr read(std::istream& stream, const GridEntry& entry) {
+    stream.seekg(0);
+    readHeader(stream);
+    openvdb::io::StreamMetadata::Ptr state(new openvdb::io::StreamMetadata);
+    openvdb::io::setStreamMetadataPtr(stream, state, /*transfer=*/false);
+    openvdb::io::setVersion(stream, libraryVersion(), fileVersion());
+    openvdb::io::setDataCompression(stream, compression());
+    stream.seekg(entry.descriptor);
+    openvdb::io::GridDescriptor descriptor;
+    openvdb::GridBase::Ptr grid = descriptor.read(stream);
+    stream.seekg(entry.start);
+    readGrid(grid, descriptor, stream);
+    openvdb::io::clearStreamMetadataPtr(stream);
+    return grid;
+  }
+  void write_to(std::ostream& stream, const openvdb::GridBase::Ptr& grid) {
+    setCompression(openvdb::io::COMPRESS_ACTIVE_MASK |
+                   (hasBloscCompression() ? openvdb::io::COMPRESS_BLOSC : openvdb::io::COMPRESS_ZIP));
+    write(stream, openvdb::GridCPtrVec{grid}, /*seekable=*/true);
+    // The header holds a random UUID; the same volume shall give the same bytes.
+    constexpr int64_t uuid_offset = 21;
+    stream.seekp(uuid_offset);
+    stream.write("00000000-0000-0000-0000-000000000000", 36);
+    stream.flush();
+  }
+
+ private:
+  using openvdb::io::Archive::write;
+};
+
+// -----------------------------------------------------------------------------------------------------
+// reading
+
+/// How a grid's values become voxels, and back.
+struct Density {
+  using Grid = openvdb::FloatGrid;
+  static constexpr VoxelFormat format = VoxelFormat::float32;
+  static Voxel voxel(float value, bool) { return Voxel::of(value); }
+};
+struct Colour {
+  using Grid = openvdb::Vec3SGrid;
+  static constexpr VoxelFormat format = VoxelFormat::rgba32;
+  /// What is inactive is void, whatever colour it has.
+  static Voxel voxel(const openvdb::Vec3s& value, bool active) {
+    Voxel v;
+    if (!active) return v;
+    for (int c = 0; c < 3; ++c)  // the comparison's order makes NaN 0
+      v.bytes[static_cast<size_t>(c)] =
+          std::byte(value[c] > 0 ? static_cast<int>(std::min(value[c], 1.0f) * 255.0f + 0.5f) : 0);
+    v.bytes[3] = std::byte{255};
+    return v;
+  }
+};
+
+template <class Kind>
+class VdbSource : public VolumeSource {
+  using Grid = typename Kind::Grid;
+  using Tree = typename Grid::TreeType;
+  using Leaf = typename Tree::LeafNodeType;  // 8^3 voxels
+  using Lower =
+      typename Tree::RootNodeType::ChildNodeType::ChildNodeType;  // 16^3 leaves or tiles: 128^3 voxels
+
+ public:
+  static SourceResult create(const std::string& path, typename Grid::Ptr grid, Context& ctx) {
+    std::unique_ptr<VdbSource> source(new VdbSource);
+    const uint64_t bytes = grid->memUsage();
+    VOX_CHECK(ctx.memory->reserve(bytes, "the OpenVDB grid"));
+    source->memory_ = ctx.memory;
+    source->reserved_ = bytes;
+    source->grid_ = grid;
+    const openvdb::CoordBBox box = grid->evalActiveVoxelBoundingBox();
+    auto& info = source->info_;
+    const auto stated = grid->template getMetadata<openvdb::Vec3IMetadata>(dims_key);
+    const auto inside = [&](int axis) {
+      return box.empty() ? stated->value()[axis] > 0
+                         : box.min()[axis] >= 0 && box.max()[axis] < stated->value()[axis];
+    };
+    if (stated && inside(0) && inside(1) && inside(2)) {
+      for (int axis = 0; axis < 3; ++axis) info.dims[axis] = stated->value()[axis];
+    } else if (box.empty()) {
+      return bad_input(path, fmt::format("grid {} is empty: expected active voxels", grid->getName()));
+    } else {
+      source->min_ = {box.min().x(), box.min().y(), box.min().z()};
+      for (int axis = 0; axis < 3; ++axis) info.dims[axis] = int64_t{box.max()[axis]} - box.min()[axis] + 1;
+    }
+    if (!checked_voxels(info.dims))
+      return bad_input(
+          path, fmt::format("grid {} spans {} x {} x {} voxels: expected at most 2^31 a side and 2^62 in all",
+                            grid->getName(), info.dims.x, info.dims.y, info.dims.z));
+    info.format = Kind::format;
+    info.sample_type = is_colour(Kind::format) ? SampleType::u8 : SampleType::f32;
+    const openvdb::Vec3d size = grid->voxelSize();
+    const openvdb::Vec3d corner = grid->indexToWorld(openvdb::Vec3d(static_cast<double>(source->min_.x),
+                                                                    static_cast<double>(source->min_.y),
+                                                                    static_cast<double>(source->min_.z)));
+    for (int axis = 0; axis < 3; ++axis) {
+      if (std::isfinite(size[axis]) && size[axis] > 0) info.spacing[static_cast<size_t>(axis)] = size[axis];
+      if (std::isfinite(corner[axis])) info.origin[static_cast<size_t>(axis)] = corner[axis];
+    }
+    return source;
+  }
+
+  ~VdbSource() override {
+    if (reserved_) memory_->release(reserved_);
+  }
+
+  Status read(const Box& box, VoxelSpan out) override {
+    const Box asked = in_index_space(box);
+    each_block<Lower::DIM>(asked, [&](Coord at, const Box& part) {
+      const Lower* lower = grid_->tree().template probeConstNode<Lower>(at);
+      if (!lower) {
+        fill(span_of(part, asked, out), part.size(), Kind::format, tile(at));
+        return true;
+      }
+      each_block<Leaf::DIM>(part, [&](Coord leaf_at, const Box& piece) {
+        const openvdb::Index n = Lower::coordToOffset(leaf_at);
+        const VoxelSpan target = span_of(piece, asked, out);
+        if (lower->isChildMaskOn(n))
+          copy_leaf(*lower->getTable()[n].getChild(), piece, target);
+        else
+          fill(target, piece.size(), Kind::format,
+               Kind::voxel(lower->getTable()[n].getValue(), lower->isValueMaskOn(n)));
+        return true;
+      });
+      return true;
+    });
+    return {};
+  }
+
+  /// From tiles alone: a box that meets a leaf is not looked at further.
+  std::optional<Voxel> uniform(const Box& box) const override {
+    if (box.empty()) return std::nullopt;
+    std::optional<Voxel> common;
+    const auto agrees = [&](const Voxel& v) {
+      if (!common) common = v;
+      return *common == v;
+    };
+    const bool same = each_block<Lower::DIM>(in_index_space(box), [&](Coord at, const Box& part) {
+      const Lower* lower = grid_->tree().template probeConstNode<Lower>(at);
+      if (!lower) return agrees(tile(at));
+      return each_block<Leaf::DIM>(part, [&](Coord leaf_at, const Box&) {
+        const openvdb::Index n = Lower::coordToOffset(leaf_at);
+        return !lower->isChildMaskOn(n) &&
+               agrees(Kind::voxel(lower->getTable()[n].getValue(), lower->isValueMaskOn(n)));
+      });
+    });
+    return same ? common : std::nullopt;
+  }
+
+ private:
+  VdbSource() = default;
+
+  Box in_index_space(const Box& box) const { return {box.lo + min_, box.hi + min_}; }
+
+  static VoxelSpan span_of(const Box& part, const Box& whole, VoxelSpan out) {
+    const Index3 at = part.lo - whole.lo;
+    return {out.row(at.y, at.z) + at.x * voxel_bytes(Kind::format), out.row_stride, out.slice_stride};
+  }
+
+  /// Value of the tile around a voxel, or the background.
+  Voxel tile(Coord at) const { return Kind::voxel(grid_->tree().getValue(at), grid_->tree().isValueOn(at)); }
+
+  /// Calls body(a voxel, part) for the part of `box` in each aligned block of `side` voxels, until it returns
+  /// false.
+  template <int64_t side, class Body>
+  static bool each_block(const Box& box, const Body& body) {
+    for (int64_t z = box.lo.z; z < box.hi.z; z = (z | (side - 1)) + 1)
+      for (int64_t y = box.lo.y; y < box.hi.y; y = (y | (side - 1)) + 1)
+        for (int64_t x = box.lo.x; x < box.hi.x; x = (x | (side - 1)) + 1) {
+          const Box block{{x, y, z}, {(x | (side - 1)) + 1, (y | (side - 1)) + 1, (z | (side - 1)) + 1}};
+          if (!body(Coord(static_cast<int>(x), static_cast<int>(y), static_cast<int>(z)),
+                    intersect(block, box)))
+            return false;
+        }
+    return true;
+  }
+
+  /// In a leaf z runs fastest, in our memory x.
+  static void copy_leaf(const Leaf& leaf, const Box& part, VoxelSpan out) {
+    const auto* values = leaf.buffer().data();
+    const int bytes = voxel_bytes(Kind::format);
+    for (int64_t z = part.lo.z; z < part.hi.z; ++z)
+      for (int64_t y = part.lo.y; y < part.hi.y; ++y) {
+        std::byte* row = out.row(y - part.lo.y, z - part.lo.z);
+        for (int64_t x = part.lo.x; x < part.hi.x; ++x, row += bytes) {
+          const auto n = static_cast<openvdb::Index>((x & 7) << 6 | (y & 7) << 3 | (z & 7));
+          const Voxel v = Kind::voxel(values[n], leaf.isValueOn(n));
+          std::memcpy(row, v.bytes.data(), static_cast<size_t>(bytes));
+        }
+      }
+  }
+
+  typename Grid::ConstPtr grid_;
+  Index3 min_{0};  ///< in the grid's index space, of our voxel (0, 0, 0)
+  MemoryBudget* memory_ = nullptr;
+  uint64_t reserved_ = 0;
+};
+
+/// The grid of that name, or the first of a type that we read.
+Result<GridEntry> choose(const std::string& path, const std::vector<GridEntry>& entries,
+                         const std::string& name) {
+  std::string list;
+  for (const GridEntry& entry : entries)
+    list += fmt::format("{}{} ({})", list.empty() ? "" : ", ", entry.name, entry.type);
+  if (list.empty()) return bad_input(path, "file holds no grids");
+  for (const GridEntry& entry : entries) {
+    const bool readable = entry.is_float() || entry.is_vec3s();
+    if (name.empty() ? !readable : entry.name != name) continue;
+    if (!readable)
+      return bad_input(path, fmt::format("grid {} has unsupported grid type {}: expected float or vec3s",
+                                         name, entry.type));
+    if (!entry.parent.empty())
+      return bad_input(
+          path, fmt::format("grid {} shares the voxels of another: expected a grid of its own", entry.name));
+    return entry;
+  }
+  if (name.empty())
+    return bad_input(path, "unsupported grid type: expected a float or vec3s grid: there are " + list);
+  return bad_input(path, fmt::format("no grid is named {}: there are {}", name, list));
+}
+
+SourceResult open_grid(const std::string& path, const std::string& name, Context& ctx) {
+  std::ifstream stream(path, std::ios_base::binary | std::ios_base::ate);
+  if (!stream) return bad_input(path, "cannot open the file");
+  const int64_t size = stream.tellg();
+  if (size < 0) return bad_input(path, "cannot read the file");
+  uint64_t estimate = 0;
+  try {
+    register_types();
+    stream.exceptions(std::ios_base::failbit | std::ios_base::badbit | std::ios_base::eofbit);
+    VOX_TRY(const auto entries, Walker(stream, size).grids(path));
+    VOX_TRY(const GridEntry entry, choose(path, entries, name));
+    // A sparse grid in memory is up to some 40 times its compressed bytes; the writer's own figure is taken
+    // where it is sane.
+    const int64_t stored = entry.end - entry.start;
+    estimate = static_cast<uint64_t>(
+        stored + (entry.memory > 0 && entry.memory / 64 < stored ? entry.memory : 4 * stored));
+    VOX_CHECK(ctx.memory->reserve(estimate, "loading the OpenVDB grid"));
+    const auto release = [&](MemoryBudget* memory) { memory->release(estimate); };
+    const std::unique_ptr<MemoryBudget, decltype(release)> loading(ctx.memory, release);
+    const openvdb::GridBase::Ptr grid = Archive().read(stream, entry);
+    if (const auto end = int64_t{stream.tellg()}; end != entry.end && entry.end != size)
+      return bad_input(path, fmt::format("grid {} ends at byte {}: expected {}", entry.name, end, entry.end));
+    if (const auto floats = openvdb::gridPtrCast<openvdb::FloatGrid>(grid))
+      return VdbSource<Density>::create(path, floats, ctx);
+    return VdbSource<Colour>::create(path, openvdb::gridPtrCast<openvdb::Vec3SGrid>(grid), ctx);
+  } catch (const std::ios_base::failure&) {
+    return bad_input(path, fmt::format("corrupt OpenVDB file: a length leads past its end at byte {}", size));
+  } catch (const std::bad_alloc&) {
+    return bad_input(path, "corrupt OpenVDB file: a grid that no memory can hold");
+  } catch (const std::exception& error) {
+    return bad_input(path, "corrupt OpenVDB file: " + one_line(error.what()));
+  }
+}
+
+// -----------------------------------------------------------------------------------------------------
+// writing
+
+template <class Kind>
+class VdbSink : public VolumeSink {
+  using Grid = typename Kind::Grid;
+  using Value = typename Grid::ValueType;
+  using Leaf = typename Grid::TreeType::LeafNodeType;
+
+ public:
+  VdbSink(const VolumeInfo& info, std::unique_ptr<OutputFile> file, MemoryBudget* memory)
+      : info_(info), file_(std::move(file)), memory_(memory), grid_(Grid::create()) {
+    openvdb::math::Mat4d matrix = openvdb::math::Mat4d::identity();
+    for (int axis = 0; axis < 3; ++axis) {
+      const double spacing = info.spacing[static_cast<size_t>(axis)],
+                   origin = info.origin[static_cast<size_t>(axis)];
+      matrix(axis, axis) = std::isfinite(spacing) && spacing > 0 ? spacing : 1;
+      matrix(3, axis) = std::isfinite(origin) ? origin : 0;
+    }
+    grid_->setTransform(openvdb::math::Transform::createLinearTransform(matrix));
+    grid_->setName(is_colour(info.format) ? "color" : "density");
+    if (!is_colour(info.format)) grid_->setGridClass(openvdb::GRID_FOG_VOLUME);
+    grid_->insertMeta(dims_key, openvdb::Vec3IMetadata(openvdb::Vec3i(static_cast<int>(info.dims.x),
+                                                                      static_cast<int>(info.dims.y),
+                                                                      static_cast<int>(info.dims.z))));
+  }
+  ~VdbSink() override { memory_->release(reserved_); }
+
+  Status write(int64_t z0, int64_t z1, ConstVoxelSpan voxels) override {
+    if (z0 != next_ || z1 < z0 || z1 > info_.dims.z)
+      return fail(ErrorCode::internal, file_->name(), "slices out of order");
+    try {
+      for (int64_t z = z0; z < z1; z = (z | 7) + 1)
+        for (int64_t y = 0; y < info_.dims.y; y += 8)
+          for (int64_t x = 0; x < info_.dims.x; x += 8)
+            VOX_CHECK(write_leaf(
+                {{x, y, z},
+                 {std::min(x + 8, info_.dims.x), std::min(y + 8, info_.dims.y), std::min((z | 7) + 1, z1)}},
+                z0, voxels));
+    } catch (const std::bad_alloc&) {
+      return fail(ErrorCode::limit, file_->name(), "not enough memory for the OpenVDB grid");
+    } catch (const std::exception& error) {
+      return fail(ErrorCode::internal, file_->name(), one_line(error.what()));
+    }
+    next_ = z1;
+    return {};
+  }
+
+  Status finish() override {
+    if (next_ != info_.dims.z) return fail(ErrorCode::internal, file_->name(), "slices are missing");
+    try {
+      grid_->tree().prune(openvdb::zeroVal<Value>());
+      std::ofstream stream;
+      stream.exceptions(std::ios_base::failbit | std::ios_base::badbit);
+      stream.open(file_->temporary(), std::ios_base::binary | std::ios_base::trunc);
+      Archive().write_to(stream, grid_);
+      stream.close();
+    } catch (const std::bad_alloc&) {
+      return fail(ErrorCode::limit, file_->name(), "not enough memory to write the OpenVDB grid");
+    } catch (const std::ios_base::failure&) {
+      return fail(ErrorCode::output, file_->name(), "cannot write the file");
+    } catch (const std::exception& error) {
+      return fail(ErrorCode::output, file_->name(), "cannot write: " + one_line(error.what()));
+    }
+    return file_->commit();
+  }
+
+ private:
+  /// A voxel's value, and whether it is active: whatever is not background or void.
+  bool value_of(const std::byte* voxel, Value& value) const {
+    if constexpr (std::is_same_v<Value, float>) {
+      if (info_.format == VoxelFormat::float32) {
+        std::memcpy(&value, voxel, sizeof value);
+      } else {
+        int32_t stored = static_cast<int32_t>(voxel[0]);
+        if (info_.format == VoxelFormat::density16) stored |= static_cast<int32_t>(voxel[1]) << 8;
+        value = static_cast<float>(stored - info_.bias());
+      }
+      return value != 0;
+    } else {
+      for (int c = 0; c < 3; ++c) value[c] = static_cast<float>(voxel[c]) / 255.0f;
+      return info_.format == VoxelFormat::rgb24 || voxel[3] != std::byte{0};
+    }
+  }
+
+  /// The voxels of `box`, which lie in one leaf. A leaf is made only where there is something to hold.
+  Status write_leaf(const Box& box, int64_t z0, ConstVoxelSpan voxels) {
+    Leaf* leaf = nullptr;
+    const Coord at(static_cast<int>(box.lo.x), static_cast<int>(box.lo.y), static_cast<int>(box.lo.z));
+    const int bytes = voxel_bytes(info_.format);
+    for (int64_t z = box.lo.z; z < box.hi.z; ++z)
+      for (int64_t y = box.lo.y; y < box.hi.y; ++y) {
+        const std::byte* row = voxels.row(y, z - z0);
+        for (int64_t x = box.lo.x; x < box.hi.x; ++x) {
+          Value value;
+          if (!value_of(row + x * bytes, value)) continue;
+          if (!leaf) {
+            leaf = grid_->tree().probeLeaf(at);
+            if (!leaf) {
+              VOX_CHECK(memory_->reserve(leaf_bytes, "the OpenVDB grid"));
+              reserved_ += leaf_bytes;
+              leaf = grid_->tree().touchLeaf(at);
+            }
+          }
+          leaf->setValueOn(static_cast<openvdb::Index>((x & 7) << 6 | (y & 7) << 3 | (z & 7)), value);
+        }
+      }
+    return {};
+  }
+
+  static constexpr uint64_t leaf_bytes = sizeof(Leaf) + Leaf::SIZE * sizeof(Value) + 64;
+  VolumeInfo info_;
+  std::unique_ptr<OutputFile> file_;
+  MemoryBudget* memory_;
+  uint64_t reserved_ = 0;
+  typename Grid::Ptr grid_;
+  int64_t next_ = 0;
+};
+
+SinkResult create_grid(const std::string& path, const VolumeInfo& info, bool force, Context& ctx) {
+  for (int axis = 0; axis < 3; ++axis)
+    if (info.dims[axis] > INT32_MAX)
+      return fail(ErrorCode::usage, path, "OpenVDB grids have at most 2^31 - 1 voxels a side");
+  if (path == "-") return bad_usage("an OpenVDB file cannot be written to standard output: name a file");
+  VOX_TRY(auto file, OutputFile::create(path, force));
+  try {
+    register_types();
+    if (is_colour(info.format)) return std::make_unique<VdbSink<Colour>>(info, std::move(file), ctx.memory);
+    return std::make_unique<VdbSink<Density>>(info, std::move(file), ctx.memory);
+  } catch (const std::exception& error) {
+    return fail(ErrorCode::output, path, one_line(error.what()));
+  }
+}
+
+const ModuleTable table{.open = open_grid, .create = create_grid};
+
+}  // namespace
+}  // namespace voxkit
+
+extern "C" const voxkit::ModuleTable* voxkit_module() {
+  return &voxkit::table;
+}

@@ -1,0 +1,44 @@
+// What a reader module (image_stack.so, openvdb.so, dicom.so) offers to plugin.cc.
+//
+// The libraries behind these readers take up to 0.4 s to load, so programs do not link them: plugin.cc opens
+// the module when a file needs it. Modules and programs share libvoxkit-formats.so, hence one copy of every
+// type below.
+#pragma once
+
+#include <cstdint>
+#include <string>
+
+#include "formats/readers.h"
+
+namespace voxkit {
+
+/// Grows with every change of ModuleTable or of a type that it mentions.
+inline constexpr uint32_t module_abi = 1;
+
+struct ModuleTable {
+  uint32_t abi = module_abi;
+  /// `grid` is the name of a grid (openvdb only), empty for the first.
+  SourceResult (*open)(const std::string& path, const std::string& grid, Context& ctx) = nullptr;
+  /// Null in modules that only read.
+  SinkResult (*create)(const std::string& path, const VolumeInfo& info, bool force, Context& ctx) = nullptr;
+};
+
+/// A module, and what to tell a user who does not have it.
+struct ModuleNeed {
+  std::string module;                    ///< "openvdb": FOLDER/openvdb.so
+  std::string action;                    ///< "reading .vdb files"
+  std::string package;                   ///< "libopenvdb-dev"
+  ErrorCode missing = ErrorCode::input;  ///< code of the error when it is missing
+};
+
+/// The table of the module in `folder`, which is loaded at the first call and never unloaded. Fails with
+/// need.missing, naming the package, where there is no such module, or why it cannot be loaded or used.
+Result<const ModuleTable*> load_module(const std::string& folder, const ModuleNeed& need);
+
+/// The folder that holds the modules: voxkit/ beside libvoxkit-formats.so.
+std::string module_folder();
+
+}  // namespace voxkit
+
+/// The one symbol of a module.
+extern "C" const voxkit::ModuleTable* voxkit_module();
