@@ -1,0 +1,156 @@
+#include "tools/common/command_line.h"
+
+#include <fmt/core.h>
+
+#include <CLI/CLI.hpp>
+#include <algorithm>
+#include <cstdlib>
+#include <numeric>
+#include <vector>
+
+#include "formats/parallel.h"
+
+namespace voxkit::cli {
+namespace {
+
+/// Insertions, deletions and substitutions that make b of a.
+size_t edit_distance(const std::string& a, const std::string& b) {
+  std::vector<size_t> row(b.size() + 1);
+  std::iota(row.begin(), row.end(), size_t{0});
+  for (size_t i = 0; i < a.size(); ++i) {
+    size_t diagonal = row[0]++;
+    for (size_t j = 0; j < b.size(); ++j) {
+      const size_t substituted = diagonal + (a[i] != b[j]);
+      diagonal = row[j + 1];
+      row[j + 1] = std::min({substituted, row[j] + 1, diagonal + 1});
+    }
+  }
+  return row.back();
+}
+
+std::string nearest_option(const CLI::App& app, const std::string& name) {
+  std::string nearest;
+  size_t least = std::string::npos;
+  for (const CLI::Option* option : app.get_options()) {
+    std::vector<std::string> names;
+    for (const std::string& n : option->get_lnames()) names.push_back("--" + n);
+    for (const std::string& n : option->get_snames()) names.push_back("-" + n);
+    for (const std::string& n : names) {
+      const size_t distance = edit_distance(name, n);
+      if (distance < least) {
+        least = distance;
+        nearest = n;
+      }
+    }
+  }
+  return nearest;
+}
+
+}  // namespace
+
+struct CommandLine::State {
+  State(const std::string& tool, const std::string& purpose) : app(purpose, tool) {}
+  CLI::App app;
+  CommonOptions options;
+};
+
+CommandLine::CommandLine(const std::string& tool, const std::string& purpose, const std::string& examples)
+    : state_(std::make_unique<State>(tool, purpose)) {
+  CLI::App& app = state_->app;
+  CommonOptions& options = state_->options;
+  app.set_help_flag("-h,--help", "Show this help");
+  app.set_version_flag("-V,--version", tool + " " + version_text(), "Show the version");
+  app.get_formatter()->column_width(34);
+  app.footer(
+      "Examples:\n" + examples +
+      "\nExit codes: 0 done; 1 the check answered no; 2 usage; 3 input unreadable; 4 output cannot be\n"
+      "written, or exists; 5 a limit was reached; 70 a bug of ours.");
+  options.threads = 0;
+  const auto quiet = app.add_flag("-q,--quiet", options.quiet, "Print nothing but errors");
+  app.add_flag("-v,--verbose", options.verbose, "Print more detail on standard error")->excludes(quiet);
+  option("-j,--threads", "N", "Worker threads; 0: all that this process may use (also VOX_THREADS)",
+         integer(options.threads, 0, 4096));
+  flag("-f,--force", "Overwrite an existing output", options.force);
+  flag("--json", "Print the result as one JSON object", options.json);
+  option("--progress", "auto|plain|never", "Progress on standard error; plain: key=value lines",
+         [&options](const std::string& text) -> Status {
+           std::string word;
+           VOX_CHECK(one_of(word, {"auto", "plain", "never"})(text));
+           options.progress = word == "auto"    ? ProgressMode::automatic
+                              : word == "plain" ? ProgressMode::plain
+                                                : ProgressMode::never;
+           return {};
+         });
+  option("--max-memory", "SIZE", "Refuse to use more memory for voxels, such as 512M or 3G",
+         [&options](const std::string& text) -> Status {
+           VOX_TRY(options.max_memory, read_size(text));
+           return {};
+         });
+}
+
+CommandLine::~CommandLine() = default;
+
+void CommandLine::option(const std::string& names, const std::string& metavar, const std::string& help,
+                         Parser parse, bool required) {
+  const std::string shown = names.substr(names.rfind(',') == names.npos ? 0 : names.rfind(',') + 1);
+  state_->app
+      .add_option_function<std::string>(
+          names,
+          [parse = std::move(parse), shown](const std::string& value) {
+            if (const Status status = parse(value); !status)
+              throw CLI::ValidationError(shown, status.error().what);
+          },
+          help)
+      ->type_name(metavar)
+      ->required(required);
+}
+
+void CommandLine::text(const std::string& names, const std::string& metavar, const std::string& help,
+                       std::string& value, bool required) {
+  const auto store = [&value](const std::string& given) -> Status {
+    value = given;
+    return {};
+  };
+  option(names, metavar, help, store, required);
+}
+
+void CommandLine::flag(const std::string& names, const std::string& help, bool& value) {
+  state_->app.add_flag(names, value, help);
+}
+
+void CommandLine::argument(const std::string& metavar, const std::string& help, std::string& value) {
+  state_->app.add_option(metavar, value, help)->required()->type_name("");
+}
+
+Result<CommandLine::Outcome> CommandLine::parse(int argc, char** argv) {
+  CLI::App& app = state_->app;
+  try {
+    app.parse(argc, argv);
+  } catch (const CLI::CallForHelp&) {
+    return Outcome{app.help(), {}};
+  } catch (const CLI::CallForVersion& version) {
+    return Outcome{std::string(version.what()) + "\n", {}};
+  } catch (const CLI::ExtrasError& error) {
+    for (const std::string& extra : app.remaining()) {
+      if (extra.size() < 2 || extra[0] != '-') continue;
+      const std::string name = extra.substr(0, extra.find('='));
+      return bad_usage(fmt::format("unknown option {}: did you mean {}?", name, nearest_option(app, name)));
+    }
+    return bad_usage(fmt::format("unexpected argument \"{}\": see --help", app.remaining().front()));
+  } catch (const CLI::ParseError& error) {
+    std::string what = error.what();
+    while (!what.empty() && (what.back() == '\n' || what.back() == ' ')) what.pop_back();
+    return bad_usage(what + (what.find("expected") == what.npos ? ": see --help" : ""));
+  }
+
+  CommonOptions options = state_->options;
+  if (const char* threads = std::getenv("VOX_THREADS"); threads != nullptr && app.count("--threads") == 0) {
+    const auto value = read_integer(threads, 0, 4096);
+    if (!value) return bad_usage("the environment variable VOX_THREADS: " + value.error().what);
+    options.threads = static_cast<int>(*value);
+  }
+  if (options.threads == 0) options.threads = available_threads();
+  return Outcome{std::nullopt, options};
+}
+
+}  // namespace voxkit::cli

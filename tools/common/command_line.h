@@ -1,0 +1,58 @@
+// The options of a tool: those that every tool has, and its own.
+#pragma once
+
+#include <cstdint>
+#include <memory>
+#include <optional>
+#include <string>
+
+#include "formats/result.h"
+#include "tools/common/parse.h"
+
+namespace voxkit::cli {
+
+enum class ProgressMode { automatic, plain, never };
+
+/// What every tool understands.
+struct CommonOptions {
+  bool quiet = false, verbose = false;
+  bool force = false;  ///< overwrite an existing output
+  bool json = false;   ///< one JSON object on standard output
+  int threads = 1;     ///< at least 1: 0 has become what this process may use
+  ProgressMode progress = ProgressMode::automatic;
+  uint64_t max_memory = 0;  ///< bytes; 0: the default of MemoryBudget
+};
+
+/// Declares options, then reads argv. Values are stored by the parsers, whose targets must live until then.
+class CommandLine {
+ public:
+  /// `purpose`: one sentence. `examples`: lines of runnable commands, one for each main use.
+  CommandLine(const std::string& tool, const std::string& purpose, const std::string& examples);
+  ~CommandLine();
+
+  /// `names` as in "-w,--blockwidth"; `metavar` names the value in the help.
+  void option(const std::string& names, const std::string& metavar, const std::string& help, Parser parse,
+              bool required = false);
+  void text(const std::string& names, const std::string& metavar, const std::string& help, std::string& value,
+            bool required = false);
+  void flag(const std::string& names, const std::string& help, bool& value);
+  /// An argument without a name, which must be given; in the order of the calls.
+  void argument(const std::string& metavar, const std::string& help, std::string& value);
+
+  /// What to do after the arguments have been read: the work, or print a text (help, version) and stop.
+  struct Outcome {
+    std::optional<std::string> print;
+    CommonOptions options;
+  };
+  /// Errors: ErrorCode::usage; an unknown option names the nearest one.
+  Result<Outcome> parse(int argc, char** argv);
+
+ private:
+  struct State;
+  std::unique_ptr<State> state_;
+};
+
+/// "0.1.0 (commit, compiler, SIMD target, cuda no)".
+std::string version_text();
+
+}  // namespace voxkit::cli

@@ -1,0 +1,137 @@
+#include "tools/common/input.h"
+
+#include <array>
+#include <filesystem>
+#include <system_error>
+#include <utility>
+
+#include "formats/container.h"
+#include "formats/input_stream.h"
+#include "formats/mapped_file.h"
+#include "formats/readers.h"
+
+namespace voxkit::cli {
+namespace {
+
+namespace fs = std::filesystem;
+
+Result<std::shared_ptr<const Container>> container_of(std::shared_ptr<const MappedFile> file) {
+  const auto bytes = file->bytes();
+  const std::string name = file->name();
+  return Container::open(bytes, name, std::move(file));
+}
+
+Result<Input> open_svmm(std::shared_ptr<const Container> container, int level) {
+  Input input;
+  VOX_TRY(input.svmm, svmm::Volume::open(std::move(container)));
+  const auto levels = static_cast<int>(input.svmm->levels().size());
+  if (level >= levels)
+    return fail(
+        ErrorCode::usage, input.svmm->container().name(),
+        "--level " + std::to_string(level) + ": expected a level from 0 to " + std::to_string(levels - 1));
+  VOX_TRY(input.source, svmm::open_source(input.svmm, level));
+  return input;
+}
+
+/// Standard input, and its first bytes, which are still to be read from it.
+struct Peeked {
+  std::unique_ptr<InputStream> stream;
+  bool container = false;
+};
+
+Result<Peeked> peek_standard_input() {
+  VOX_TRY(auto stream, open_stream("-"));
+  std::array<std::byte, container_magic.size()> head;
+  size_t have = 0;
+  while (have < head.size()) {
+    VOX_TRY(const size_t got, stream->read(std::span(head).subspan(have)));
+    if (got == 0) break;
+    have += got;
+  }
+  const std::span<const std::byte> first(head.data(), have);
+  const bool container = is_container(first);
+  return Peeked{prepend(std::string(reinterpret_cast<const char*>(first.data()), have), std::move(stream)),
+                container};
+}
+
+}  // namespace
+
+void declare_input_options(CommandLine& line, OpenOptions& options, bool type) {
+  line.option("--dims", "X,Y,Z", "Extent of a .raw input", dims(options.dims));
+  if (type) {
+    line.option("--type", "TYPE", "Type of a .raw input: u8 i8 u16 i16 u32 i32 f32 f64 rgb8 rgba8 bit",
+                [&options](const std::string& text) -> Status {
+                  options.type = text;
+                  return {};
+                });
+  }
+  line.option("--endian", "big|little", "Byte order of a .raw input",
+              [&options](const std::string& text) -> Status {
+                std::string word;
+                VOX_CHECK(one_of(word, {"big", "little"})(text));
+                options.big_endian = word == "big";
+                return {};
+              });
+  line.text("--grid", "NAME", "Grid of a .vdb input", options.grid);
+}
+
+bool is_compressed(const std::string& name) {
+  return has_ending(name, ".svmm");
+}
+
+Result<std::shared_ptr<const Container>> open_container(const std::string& name) {
+  if (name != "-") {
+    VOX_TRY(auto file, MappedFile::open(name));
+    return container_of(std::move(file));
+  }
+  VOX_TRY(Peeked peeked, peek_standard_input());
+  VOX_TRY(auto file, MappedFile::spool(*peeked.stream));
+  return container_of(std::move(file));
+}
+
+Result<Input> open_compressed(const std::string& name, int level, Context&) {
+  VOX_TRY(auto container, open_container(name));
+  return open_svmm(std::move(container), level);
+}
+
+Result<Input> open_input(const std::string& name, const OpenOptions& options, Context& ctx) {
+  if (is_compressed(name)) return open_compressed(name, 0, ctx);
+  Input input;
+  if (name != "-") {
+    VOX_TRY(input.source, open_volume(name, options, ctx));
+    return input;
+  }
+  VOX_TRY(Peeked peeked, peek_standard_input());
+  if (!peeked.container) {
+    VOX_TRY(input.source, open_nrrd(std::move(peeked.stream), ctx));
+    return input;
+  }
+  VOX_TRY(auto file, MappedFile::spool(*peeked.stream));
+  VOX_TRY(auto container, container_of(std::move(file)));
+  return open_svmm(std::move(container), 0);
+}
+
+std::optional<uint64_t> file_bytes(const std::string& name) {
+  std::error_code error;
+  const fs::file_status status = fs::status(name, error);
+  if (fs::is_regular_file(status)) {
+    const uint64_t bytes = fs::file_size(name, error);
+    return error ? std::nullopt : std::optional(bytes);
+  }
+  if (!fs::is_directory(status)) return std::nullopt;
+  uint64_t total = 0;
+  for (fs::directory_iterator it(name, error), end; !error && it != end; it.increment(error)) {
+    std::error_code unreadable;
+    if (it->is_regular_file(unreadable)) total += it->file_size(unreadable);
+  }
+  return error ? std::nullopt : std::optional(total);
+}
+
+Status check_distinct(const std::string& input, const std::string& output) {
+  std::error_code error;
+  if (fs::equivalent(input, output, error) && !error && fs::is_regular_file(input, error))
+    return fail(ErrorCode::usage, output, "is the input as well: expected another file");
+  return {};
+}
+
+}  // namespace voxkit::cli

@@ -1,0 +1,37 @@
+// The volume inputs of the tools: everything that formats/ opens, and compressed volumes.
+#pragma once
+
+#include <cstdint>
+#include <memory>
+#include <optional>
+#include <string>
+
+#include "formats/open_volume.h"
+#include "libsvmm/svmm.h"
+#include "tools/common/command_line.h"
+
+namespace voxkit::cli {
+
+struct Input {
+  std::unique_ptr<VolumeSource> source;
+  std::shared_ptr<const svmm::Volume> svmm;  ///< null for plain volumes
+};
+
+/// Declares --dims, --endian and --grid, and with `type` also --type as the type of a .raw input.
+void declare_input_options(CommandLine& line, OpenOptions& options, bool type = true);
+
+/// Opens a file, a built-in, or standard input ("-": a container or NRRD, told apart by its first bytes).
+Result<Input> open_input(const std::string& name, const OpenOptions& options, Context& ctx);
+/// Opens a compressed volume only. `level`: of the mip-map, as the voxels of the source.
+Result<Input> open_compressed(const std::string& name, int level, Context& ctx);
+/// The container in a file or on standard input.
+Result<std::shared_ptr<const Container>> open_container(const std::string& name);
+
+/// True for names that end like a compressed volume.
+bool is_compressed(const std::string& name);
+/// Bytes of the file, or of all files of a folder; nothing for built-ins, patterns and streams.
+std::optional<uint64_t> file_bytes(const std::string& name);
+/// Refuses an output that is the input file itself: ErrorCode::usage.
+Status check_distinct(const std::string& input, const std::string& output);
+
+}  // namespace voxkit::cli

@@ -1,0 +1,54 @@
+// The life of a tool: options, work, one line about an error, an exit code.
+#pragma once
+
+#include <chrono>
+#include <cstdint>
+#include <functional>
+#include <memory>
+#include <string>
+
+#include "formats/context.h"
+#include "tools/common/command_line.h"
+#include "tools/common/progress.h"
+
+namespace voxkit::cli {
+
+/// What the work of a tool is given.
+class Run {
+ public:
+  Run(std::string tool_name, const CommonOptions& common)
+      : tool(std::move(tool_name)), options(common), memory_(common.max_memory) {
+    ctx.threads = common.threads;
+    ctx.memory = &memory_;
+  }
+
+  std::string tool;
+  CommonOptions options;
+  Context ctx;  ///< its progress goes to the stage begun last
+
+  /// Begins a stage of work for the progress display, such as "encode".
+  void stage(const std::string& name);
+  /// A line on standard error, with --verbose only.
+  void note(const std::string& line) const;
+  /// Seconds since the tool started.
+  double seconds() const;
+
+ private:
+  MemoryBudget memory_;
+  std::unique_ptr<Progress> progress_;
+  std::chrono::steady_clock::time_point start_ = std::chrono::steady_clock::now();
+};
+
+/// The body of every main(): `declare` adds the tool's options, `work` does it and returns the exit code (0
+/// or 1). Handles signals: outputs that are not complete are removed, and the exit code is 128 + the signal.
+int run_tool(int argc, char** argv, const std::string& tool, const std::string& purpose,
+             const std::string& examples, const std::function<void(CommandLine&)>& declare,
+             const std::function<Result<int>(Run&)>& work);
+
+/// Writes to standard output; ErrorCode::output if that fails.
+Status print(const std::string& text);
+
+/// The largest resident set of this process so far.
+uint64_t peak_rss_bytes();
+
+}  // namespace voxkit::cli

@@ -1,0 +1,39 @@
+#include "tools/common/progress.h"
+
+#include <fmt/core.h>
+#include <unistd.h>
+
+#include <cstdio>
+#include <utility>
+
+namespace voxkit::cli {
+
+using namespace std::chrono_literals;
+
+Progress::Progress(ProgressMode mode, std::string stage) : mode_(mode), stage_(std::move(stage)) {
+  if (mode_ == ProgressMode::automatic && !isatty(STDERR_FILENO)) mode_ = ProgressMode::never;
+}
+
+Progress::~Progress() {
+  if (shown_ && mode_ == ProgressMode::automatic) fmt::print(stderr, "\r\033[K");
+}
+
+void Progress::update(double fraction) {
+  const auto now = Clock::now();
+  if (mode_ == ProgressMode::plain) {
+    // The end is always reported, once; what is before it twice a second.
+    const bool end = fraction >= 1;
+    if (complete_ || (!end && now - last_ < 500ms)) return;
+    complete_ = end;
+    last_ = now;
+    fmt::print(stderr, "stage={} done={:.2f}\n", stage_, fraction);
+  } else if (mode_ == ProgressMode::automatic) {
+    if (now - start_ < 1s || (shown_ && now - last_ < 100ms)) return;
+    shown_ = true;
+    last_ = now;
+    fmt::print(stderr, "\r{} {:3.0f} %\033[K", stage_, 100 * fraction);
+    std::fflush(stderr);
+  }
+}
+
+}  // namespace voxkit::cli

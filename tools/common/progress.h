@@ -1,0 +1,30 @@
+// How far the work is, on standard error.
+#pragma once
+
+#include <chrono>
+#include <string>
+
+#include "tools/common/command_line.h"
+
+namespace voxkit::cli {
+
+class Progress {
+ public:
+  /// automatic: a line on a terminal, once the stage has taken a second. plain: lines "stage=encode
+  /// done=0.25".
+  Progress(ProgressMode mode, std::string stage);
+  ~Progress();
+  Progress(const Progress&) = delete;
+  Progress& operator=(const Progress&) = delete;
+  /// Fraction done, 0..1; from one thread at a time.
+  void update(double fraction);
+
+ private:
+  using Clock = std::chrono::steady_clock;
+  ProgressMode mode_;
+  std::string stage_;
+  Clock::time_point start_ = Clock::now(), last_ = start_;
+  bool shown_ = false, complete_ = false;
+};
+
+}  // namespace voxkit::cli
