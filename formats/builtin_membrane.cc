@@ -113,7 +113,7 @@ void shade(const std::array<FieldRow, 8>& fields, int width, float* __restrict g
       second = std::max(second, std::min(first, fields[f][x]));
       first = std::max(first, fields[f][x]);
     }
-    const float membrane = std::max(0.0f, 1 - (first - second) * 28);
+    const float membrane = std::max(0.0f, 1 - (first - second) * 40);
     const float organelle = std::clamp((fields[6][x] - 0.27f) * 25, 0.0f, 1.0f);
     const float plasma = 176 + 60 * fields[5][x] + 40 * first + 45 * fields[7][x] - 62 * organelle;
     grey[x] = plasma + (52 - plasma) * membrane * (2 - membrane);
