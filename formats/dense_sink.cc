@@ -51,9 +51,18 @@ Status DenseSink::put_voxels(const std::byte* voxels, int64_t count) {
   const int64_t in_bytes = voxel_bytes(info_.format);
   if (layout_.type == SampleType::bit) {
     size_t filled = 0;
-    for (int64_t i = 0; i < count; ++i) {
-      bits_ |= (voxels[i] & std::byte{1}) << bit_count_;
-      if (++bit_count_ < 8) continue;
+    for (int64_t i = 0; i < count;) {
+      if (bit_count_ == 0 && i + 8 <= count) {
+        // Moves bit 0 of byte k to bit 56 + k, and from there down.
+        uint64_t eight;
+        std::memcpy(&eight, voxels + i, 8);
+        bits_ = static_cast<std::byte>((eight & 0x0101010101010101) * 0x0102040810204080 >> 56);
+        bit_count_ = 8;
+        i += 8;
+      } else {
+        bits_ |= (voxels[i++] & std::byte{1}) << bit_count_++;
+      }
+      if (bit_count_ < 8) continue;
       buffer_[filled++] = bits_;
       bits_ = std::byte{0};
       bit_count_ = 0;
