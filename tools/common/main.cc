@@ -64,14 +64,6 @@ int exit_code(const Error& error) {
   return 70;
 }
 
-/// One line: what a file name or a library's message breaks is mended.
-void report(const std::string& tool, const Error& error) {
-  std::string line = tool + ": " + (error.file.empty() ? "" : error.file + ": ") + error.what;
-  for (char& c : line)
-    if (static_cast<unsigned char>(c) < ' ' || c == '\x7f') c = ' ';
-  fmt::print(stderr, "{}\n", line);
-}
-
 }  // namespace
 
 void Run::stage(const std::string& name) {
@@ -117,6 +109,14 @@ int run_tool(int argc, char** argv, const std::string& tool, const std::string& 
   if (result) return *result;
   report(tool, result.error());
   return exit_code(result.error());
+}
+
+void report(const std::string& tool, const Error& error) {
+  std::string line = tool + ": " + (error.file.empty() ? "" : error.file + ": ") + error.what;
+  // A file name, or the message of a library, may have line feeds.
+  for (char& c : line)
+    if (static_cast<unsigned char>(c) < ' ' || c == '\x7f') c = ' ';
+  fmt::print(stderr, "{}\n", line);
 }
 
 Status print(const std::string& text) {

@@ -45,6 +45,9 @@ int run_tool(int argc, char** argv, const std::string& tool, const std::string& 
              const std::string& examples, const std::function<void(CommandLine&)>& declare,
              const std::function<Result<int>(Run&)>& work);
 
+/// One line about an error on standard error: "TOOL: FILE: what is wrong: what was expected".
+void report(const std::string& tool, const Error& error);
+
 /// Writes to standard output; ErrorCode::output if that fails.
 Status print(const std::string& text);
 

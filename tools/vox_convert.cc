@@ -1,0 +1,118 @@
+// vox-convert: from any volume format to any other, whole or in part.
+#include <fmt/core.h>
+
+#include "formats/convert.h"
+#include "formats/copy.h"
+#include "formats/open_volume.h"
+#include "formats/output_file.h"
+#include "formats/readers.h"
+#include "tools/common/input.h"
+#include "tools/common/json.h"
+#include "tools/common/main.h"
+#include "tools/common/retype.h"
+
+namespace voxkit::cli {
+namespace {
+
+struct Options {
+  std::string input, output;
+  OpenOptions open;
+  std::optional<std::string> type;
+  std::optional<TargetType> output_type;
+  std::optional<Box> crop;
+  std::optional<Index3> resample;
+  std::optional<ValueRange> range;
+  bool apply_scale = false;
+};
+
+void declare(CommandLine& line, Options& o) {
+  line.argument("INPUT", "Volume file, folder, built-in such as menger:5, or -", o.input);
+  line.text("-o,--output", "OUT", "Volume file, pattern such as slice-%04d.tif, or -", o.output, true);
+  line.option("--type", "TYPE",
+              "u8 i8 u16 i16 f32 rgba8 bit: type of the output; of a .raw INPUT, its own type",
+              [&o](const std::string& text) -> Status {
+                o.type = text;
+                return {};
+              });
+  line.option("--output-type", "TYPE", "Type of the output, whatever the input is",
+              target_type(o.output_type));
+  declare_range_option(line, o.range);
+  line.flag("--apply-scale", "Write real values (slope and intercept applied) as f32", o.apply_scale);
+  line.option("--crop", "BOX", "X0,Y0,Z0,X1,Y1,Z1: part of the input, half open", box(o.crop));
+  line.option("--resample", "X,Y,Z", "New extent, after --crop", dims(o.resample));
+  declare_input_options(line, o.open, false);
+}
+
+/// The input with everything done to it but its type.
+Result<std::unique_ptr<VolumeSource>> open(const Options& o, Context& ctx) {
+  VOX_TRY(Input input, open_input(o.input, o.open, ctx));
+  auto source = std::move(input.source);
+  if (o.crop) {
+    VOX_TRY(source, crop(std::move(source), *o.crop, ctx));
+  }
+  if (o.apply_scale) {
+    VOX_TRY(source, apply_scale(std::move(source), ctx));
+  }
+  if (o.resample) {
+    VOX_TRY(source, resample(std::move(source), *o.resample));
+  }
+  return source;
+}
+
+Result<int> work(Options& o, Run& run) {
+  if (has_ending(o.input, ".raw")) {
+    o.open.type = o.type;
+  } else if (o.type) {
+    if (o.output_type)
+      return bad_usage("--type and --output-type both name the type of the output: expected one");
+    const auto type = parse_target_type(*o.type);
+    if (!type) return bad_usage("--type: " + type.error().what);
+    o.output_type = *type;
+  }
+  if (run.options.json && o.output == "-")
+    return bad_usage("--json and the output - both use standard output");
+  VOX_CHECK(check_distinct(o.input, o.output));
+  VOX_CHECK(check_output(o.output, run.options.force));
+
+  VOX_TRY(auto source, open(o, run.ctx));
+  if (o.input == "-" && source->forward_only()) {
+    VOX_TRY(source, retyped(std::move(source), nullptr, o.output_type, o.range, run));
+  } else {
+    VOX_TRY(source, retyped(
+                        std::move(source), [&] { return open(o, run.ctx); }, o.output_type, o.range, run));
+  }
+  const VolumeInfo info = source->info();
+  VOX_TRY(auto sink, create_volume(o.output, info, run.options.force, run.ctx));
+  run.stage("convert");
+  VOX_CHECK(copy_volume(*source, info.box(), *sink, run.ctx));
+
+  run.note(fmt::format("{}: {} x {} x {} voxels of {} in {:.2f} s", o.output, info.dims.x, info.dims.y,
+                       info.dims.z, name(info.format), run.seconds()));
+  if (run.options.json) {
+    Json json = Json::result();
+    json.set("tool", run.tool).set("version", version_text()).set("input", o.input).set("output", o.output);
+    json.set("dims", info.dims).set("voxel_format", name(info.format)).set("raw_bytes", raw_bytes(info));
+    if (const auto bytes = file_bytes(o.output)) json.set("file_bytes", *bytes);
+    json.set("seconds", run.seconds())
+        .set("peak_rss_bytes", peak_rss_bytes())
+        .set("threads", run.options.threads);
+    VOX_CHECK(print(json.text()));
+  }
+  return 0;
+}
+
+}  // namespace
+}  // namespace voxkit::cli
+
+int main(int argc, char** argv) {
+  using namespace voxkit::cli;
+  Options options;
+  return run_tool(
+      argc, argv, "vox-convert", "Converts between volume formats.",
+      "  vox-convert menger:4 -o sponge.nrrd\n"
+      "  vox-convert scan.raw --dims 256,256,225 --type u8 -o scan.nii.gz\n"
+      "  vox-convert head.nii.gz -o head.nrrd --type u8 --range 0,1200\n"
+      "  vox-convert big.nrrd -o small.nrrd --crop 0,0,0,512,512,256 --resample 256,256,128\n"
+      "  vox-convert scan.nrrd -o slice-%04d.tif\n",
+      [&](CommandLine& line) { declare(line, options); }, [&](Run& run) { return work(options, run); });
+}

@@ -1,0 +1,84 @@
+// vox-decode: a compressed volume, whole, in part, or at a coarser level, as a plain volume.
+#include <fmt/core.h>
+
+#include "formats/convert.h"
+#include "formats/copy.h"
+#include "formats/open_volume.h"
+#include "formats/output_file.h"
+#include "tools/common/input.h"
+#include "tools/common/json.h"
+#include "tools/common/main.h"
+#include "tools/common/retype.h"
+
+namespace voxkit::cli {
+namespace {
+
+struct Options {
+  std::string input, output;
+  std::optional<Box> roi;
+  int level = 0;
+  std::optional<TargetType> type;
+  std::optional<ValueRange> range;
+};
+
+void declare(CommandLine& line, Options& o) {
+  line.argument("FILE", "Compressed volume (.svmm), or -", o.input);
+  line.text("-o,--output", "OUT", "Volume file, pattern such as slice-%04d.tif, or -", o.output, true);
+  line.option("--roi", "BOX", "X0,Y0,Z0,X1,Y1,Z1: part of the volume, half open, in voxels of level 0",
+              box(o.roi));
+  line.option("--level", "N", "Stop at this mip level; 0: all detail", integer(o.level, 0, 64));
+  line.option("--type", "TYPE", "Type of the output: u8 i8 u16 i16 f32 rgba8 bit", target_type(o.type));
+  declare_range_option(line, o.range);
+}
+
+Result<int> work(const Options& o, Run& run) {
+  if (run.options.json && o.output == "-")
+    return bad_usage("--json and the output - both use standard output");
+  VOX_CHECK(check_distinct(o.input, o.output));
+  VOX_CHECK(check_output(o.output, run.options.force));
+  VOX_TRY(Input input, open_compressed(o.input, o.level, run.ctx));
+  auto source = std::move(input.source);
+  if (o.roi) {
+    const Index3 dims = input.svmm->info().dims;
+    if (!input.svmm->info().box().contains(*o.roi))
+      return bad_usage(
+          fmt::format("--roi: the box is not inside the volume: expected one inside 0,0,0,{},{},{}", dims.x,
+                      dims.y, dims.z));
+    // Every voxel of the level that the box touches.
+    const auto factor = static_cast<int64_t>(input.svmm->levels()[static_cast<size_t>(o.level)].mip_factor);
+    const Box part{o.roi->lo / factor, (o.roi->hi + (factor - 1)) / factor};
+    VOX_TRY(source, crop(std::move(source), part, run.ctx));
+  }
+  VOX_TRY(source, retyped(std::move(source), nullptr, o.type, o.range, run));
+  const VolumeInfo info = source->info();
+  VOX_TRY(auto sink, create_volume(o.output, info, run.options.force, run.ctx));
+  run.stage("decode");
+  VOX_CHECK(copy_volume(*source, info.box(), *sink, run.ctx));
+
+  run.note(fmt::format("{}: {} x {} x {} voxels of {} in {:.2f} s", o.output, info.dims.x, info.dims.y,
+                       info.dims.z, name(info.format), run.seconds()));
+  if (run.options.json) {
+    Json json = Json::result();
+    json.set("tool", run.tool).set("version", version_text()).set("input", o.input).set("output", o.output);
+    json.set("level", o.level).set("dims", info.dims).set("voxel_format", name(info.format));
+    json.set("raw_bytes", raw_bytes(info)).set("decode_seconds", run.seconds());
+    json.set("peak_rss_bytes", peak_rss_bytes()).set("threads", run.options.threads);
+    VOX_CHECK(print(json.text()));
+  }
+  return 0;
+}
+
+}  // namespace
+}  // namespace voxkit::cli
+
+int main(int argc, char** argv) {
+  using namespace voxkit::cli;
+  Options options;
+  return run_tool(
+      argc, argv, "vox-decode", "Decompresses volumes.",
+      "  vox-decode head.svmm -o head.nrrd\n"
+      "  vox-decode head.svmm -o part.nii.gz --roi 0,0,0,64,64,64\n"
+      "  vox-decode head.svmm -o small.nrrd --level 2\n"
+      "  vox-decode head.svmm -o slice-%04d.png --type u8\n",
+      [&](CommandLine& line) { declare(line, options); }, [&](Run& run) { return work(options, run); });
+}

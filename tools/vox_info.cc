@@ -1,0 +1,211 @@
+// vox-info: what is in a volume file, without decoding it.
+#include <fmt/core.h>
+
+#include "formats/container.h"
+#include "formats/copy.h"
+#include "formats/open_volume.h"
+#include "formats/readers.h"
+#include "tools/common/input.h"
+#include "tools/common/json.h"
+#include "tools/common/main.h"
+
+namespace voxkit::cli {
+namespace {
+
+struct Options {
+  std::string file;
+  OpenOptions open;
+  bool check = false;
+};
+
+void declare(CommandLine& line, Options& o) {
+  line.argument("FILE", "Volume file, folder, built-in or -", o.file);
+  line.flag("--check", "Verify every checksum and the whole structure; exit 1 if something is wrong",
+            o.check);
+  declare_input_options(line, o.open);
+}
+
+std::string_view format_of(const std::string& file, const Input& input) {
+  if (input.svmm) return "svmm";
+  if (is_builtin(file)) return "builtin";
+  static constexpr std::pair<std::string_view, std::string_view> endings[] = {
+      {".nhdr", "nrrd"}, {".nii", "nifti"}, {".nii.gz", "nifti"}, {".raw", "raw"}, {".vdb", "vdb"},
+      {".mrc", "mrc"},   {".map", "mrc"},   {".ccp4", "mrc"},     {".rec", "mrc"}, {".nrrd", "nrrd"}};
+  for (const auto& [ending, format] : endings)
+    if (has_ending(file, ending)) return format;
+  return file == "-" ? "nrrd" : "slices";
+}
+
+std::string_view name(SampleType type) {
+  constexpr std::string_view names[] = {"",    "u8",  "i8",  "u16", "i16", "u32",
+                                        "i32", "u64", "i64", "f32", "f64", "bit"};
+  return names[static_cast<size_t>(type)];
+}
+std::string_view name(svmm::Layout layout) {
+  return layout == svmm::Layout::thesis ? "thesis" : "plain";
+}
+std::string_view name(svmm::Bound bound) {
+  return bound == svmm::Bound::local ? "local" : "global";
+}
+std::string_view name(svmm::Base base) {
+  switch (base) {
+    case svmm::Base::raw:
+      return "raw";
+    case svmm::Base::bitmap:
+      return "bitmap";
+    case svmm::Base::alpha:
+      return "alpha";
+    case svmm::Base::gray:
+      return "gray";
+    case svmm::Base::bc1:
+      return "bc1";
+  }
+  return "?";
+}
+
+std::string letters(uint32_t kind) {
+  std::string text;
+  for (int i = 0; i < 4; ++i) text += static_cast<char>(kind >> (8 * i) & 0xff);
+  return text;
+}
+
+/// The parameters as the JSON object `params`.
+Json params_json(const svmm::Params& p) {
+  Json widths = Json::array();
+  for (const int w : p.blockwidths) widths.push(int64_t{w});
+  Json json = Json::object();
+  json.set("layout", name(p.layout)).set("base", name(p.base)).set("bound", name(p.bound));
+  json.set("alpha_weight", p.alpha_weight)
+      .set("blockwidths", std::move(widths))
+      .set("rootwidth", p.rootwidth);
+  json.set("quality", p.quality).set("delta", p.delta).set("full_scale", p.full_scale);
+  return json;
+}
+
+Json json_of(const Options& o, const Run& run, const Input& input, std::optional<uint64_t> bytes) {
+  const VolumeInfo& info = input.source->info();
+  Json json = Json::result();
+  json.set("tool", run.tool).set("version", version_text()).set("input", o.file);
+  json.set("format", format_of(o.file, input)).set("codec", input.svmm ? "svmm" : "none");
+  json.set("dims", info.dims).set("voxel_format", voxkit::name(info.format));
+  if (!is_colour(info.format)) json.set("sample_type", name(info.sample_type));
+  json.set("raw_bytes", raw_bytes(info));
+  if (bytes) {
+    json.set("file_bytes", *bytes);
+    json.set("percent", 100 * static_cast<double>(*bytes) / static_cast<double>(raw_bytes(info)));
+    json.set("bits_per_voxel",
+             8 * static_cast<double>(*bytes) / static_cast<double>(*checked_voxels(info.dims)));
+  }
+  Json spacing = Json::array(), origin = Json::array();
+  for (size_t a = 0; a < 3; ++a) {
+    spacing.push(info.spacing[a]);
+    origin.push(info.origin[a]);
+  }
+  json.set("spacing", std::move(spacing)).set("origin", std::move(origin));
+  json.set("slope", info.slope).set("intercept", info.intercept);
+  json.set("params", input.svmm ? params_json(input.svmm->params()) : Json::object());
+  Json chunks = Json::array();
+  if (input.svmm) {
+    for (const ChunkEntry& entry : input.svmm->container().table()) {
+      Json chunk = Json::object();
+      chunk.set("kind", letters(entry.kind)).set("index", entry.index).set("part", entry.part);
+      chunk.set("offset", entry.offset).set("length", entry.length);
+      chunk.set("checksum", fmt::format("{:016x}", entry.checksum));
+      chunks.push(std::move(chunk));
+    }
+  }
+  json.set("chunks", std::move(chunks));
+  if (input.svmm) {
+    Json levels = Json::array();
+    int64_t index = 0;
+    for (const svmm::Level& l : input.svmm->levels()) {
+      Json level = Json::object();
+      level.set("index", index++)
+          .set("blockwidth", l.blockwidth)
+          .set("mip_factor", l.mip_factor)
+          .set("dims", l.dims);
+      level.set("blocks", l.blocks)
+          .set("block_bytes", l.block_bytes)
+          .set("terminal_voxels", l.terminal_voxels);
+      levels.push(std::move(level));
+    }
+    json.set("levels", std::move(levels));
+  }
+  if (o.check) json.set("checked", true);
+  return json;
+}
+
+std::string text_of(const Options& o, const Input& input, std::optional<uint64_t> bytes) {
+  const VolumeInfo& info = input.source->info();
+  std::string text = fmt::format("{}: {}\n", o.file, format_of(o.file, input));
+  text += fmt::format("voxels      {} x {} x {} {}", info.dims.x, info.dims.y, info.dims.z,
+                      voxkit::name(info.format));
+  text += is_colour(info.format) ? "\n" : fmt::format(" ({})\n", name(info.sample_type));
+  text += fmt::format("spacing     {:.6g} {:.6g} {:.6g}, origin {:.6g} {:.6g} {:.6g}\n", info.spacing[0],
+                      info.spacing[1], info.spacing[2], info.origin[0], info.origin[1], info.origin[2]);
+  if (info.slope != 1 || info.intercept != 0)
+    text += fmt::format("real value  {:.6g} * sample + {:.6g}\n", info.slope, info.intercept);
+  text += fmt::format("raw bytes   {}\n", raw_bytes(info));
+  if (bytes)
+    text += fmt::format("file bytes  {} ({:.4g} %, {:.4g} bits a voxel)\n", *bytes,
+                        100 * static_cast<double>(*bytes) / static_cast<double>(raw_bytes(info)),
+                        8 * static_cast<double>(*bytes) / static_cast<double>(*checked_voxels(info.dims)));
+  if (input.svmm) {
+    const svmm::Params& p = input.svmm->params();
+    text +=
+        fmt::format("params      layout {}, base {}, bound {}, quality {:.6g}, delta {:.6g}, rootwidth {}\n",
+                    name(p.layout), name(p.base), name(p.bound), p.quality, p.delta, p.rootwidth);
+    text += "level  width  factor  dims                    blocks  block bytes  terminal voxels\n";
+    int index = 0;
+    for (const svmm::Level& l : input.svmm->levels())
+      text += fmt::format("{:>5}  {:>5}  {:>6}  {:<18}  {:>10}  {:>11}  {:>15}\n", index++, l.blockwidth,
+                          l.mip_factor, fmt::format("{} x {} x {}", l.dims.x, l.dims.y, l.dims.z), l.blocks,
+                          l.block_bytes, l.terminal_voxels);
+  }
+  if (o.check) text += "check       passed\n";
+  return text;
+}
+
+/// Takes voxels and keeps none: to check a plain volume is to read it.
+class NullSink : public VolumeSink {
+ public:
+  Status write(int64_t, int64_t, ConstVoxelSpan) override { return {}; }
+  Status finish() override { return {}; }
+};
+
+Result<int> work(const Options& o, Run& run) {
+  VOX_TRY(const Input input, open_input(o.file, o.open, run.ctx));
+  if (o.check) {
+    run.stage("check");
+    NullSink sink;
+    const Status status = input.svmm ? input.svmm->check(run.ctx)
+                                     : copy_volume(*input.source, input.source->info().box(), sink, run.ctx);
+    if (!status && status.error().code == ErrorCode::input) {
+      // The answer of the check is no: not a failure to give one.
+      report(run.tool, status.error());
+      return 1;
+    }
+    VOX_CHECK(status);
+  }
+  const auto bytes = input.svmm ? std::optional(input.svmm->container().file_bytes()) : file_bytes(o.file);
+  if (run.options.json) {
+    VOX_CHECK(print(json_of(o, run, input, bytes).text()));
+  } else if (!run.options.quiet) {
+    VOX_CHECK(print(text_of(o, input, bytes)));
+  }
+  return 0;
+}
+
+}  // namespace
+}  // namespace voxkit::cli
+
+int main(int argc, char** argv) {
+  using namespace voxkit::cli;
+  Options options;
+  return run_tool(
+      argc, argv, "vox-info", "Shows what is in a volume file.",
+      "  vox-info head.nii.gz\n"
+      "  vox-info head.svmm --json\n"
+      "  vox-info head.svmm --check\n",
+      [&](CommandLine& line) { declare(line, options); }, [&](Run& run) { return work(options, run); });
+}
