@@ -30,6 +30,7 @@ class FileFormatTest : public testing::Test {
 
   std::string path(const std::string& name) const { return folder_ + "/" + name; }
   std::string put(const std::string& name, const std::string& content) const {
+    std::filesystem::remove(path(name));  // cutting a file short may wait for the disk, a new one does not
     std::ofstream(path(name), std::ios::binary) << content;
     return path(name);
   }
