@@ -98,8 +98,8 @@ struct Decoder {
         nullptr;  ///< if level == 0: its block, not yet decoded; `value` is the parent's
     Index3 in_block{0};
   };
-  /// The voxel that covers `v` (of the stop level): terminal, or of level `floor`.
-  Result<Found> descend(Index3 v, size_t floor) const {
+  /// The voxel that covers `v` (of the stop level): terminal, or of the stop level.
+  Result<Found> descend(Index3 v) const {
     size_t k = root();
     VOX_TRY(const std::byte* bytes, block(k, 0));
     Found found{{}, k, false, nullptr, {}};
@@ -119,7 +119,7 @@ struct Decoder {
       const Link link = here.link(index / 8);
       found.value = here.value(index);
       found.terminal = !(link.mask >> (index % 8) & 1u);
-      if (found.terminal || k == floor) return found;
+      if (found.terminal || k == stop) return found;
       VOX_TRY(bytes, block(k - 1, link.child(static_cast<int>(index % 8))));
     }
   }
@@ -159,6 +159,34 @@ struct Decoder {
     return {};
   }
 
+  /// The one value of the voxels of `box`, where the terminal voxels of a single block tell it.
+  std::optional<Voxel> uniform(const Box& box) const {
+    auto bytes = block(root(), 0);
+    for (size_t k = root(); bytes && structural(k); --k) {
+      const Index3 size = volume.store_->levels[k].size, edge(scale(k));
+      const Index3 first = box.lo / edge, last = (box.hi - Index3(1)) / edge;
+      const Index3 origin = k == root() ? Index3(0) : first / size * size;
+      const StructuralBlock here = structural_block(k, *bytes);
+      const auto link_of = [&](Index3 v) { return here.link(subblock_index(v - origin, size)); };
+      const auto is_terminal = [&](Index3 v) {
+        return k == stop || !(link_of(v).mask >> voxel_in_subblock(v - origin) & 1u);
+      };
+      if (first == last && !is_terminal(first)) {  // the box lies within one block of the level below
+        bytes = block(k - 1, link_of(first).child(voxel_in_subblock(first - origin)));
+        continue;
+      }
+      const Voxel value = here.value(voxel_index(first - origin, size));
+      for (int64_t z = first.z; z <= last.z; ++z)
+        for (int64_t y = first.y; y <= last.y; ++y)
+          for (int64_t x = first.x; x <= last.x; ++x) {
+            const Index3 v{x, y, z};
+            if (!is_terminal(v) || here.value(voxel_index(v - origin, size)) != value) return std::nullopt;
+          }
+      return decoded_value(value, format);
+    }
+    return std::nullopt;
+  }
+
   Status decode_base(const std::byte* bytes, Index3 origin, Index3 size, const Voxel& parent, const Box& box,
                      VoxelSpan out) const {
     const Box part = intersect({origin, origin + size}, box);
@@ -189,7 +217,7 @@ Result<Voxel> Volume::sample(Index3 voxel, int level) const {
   const Decoder decoder{*this, static_cast<size_t>(level)};
   if (!Box{Index3(0), dims_at(level)}.contains(voxel))
     return fail(ErrorCode::internal, container_->name(), "sample outside the volume");
-  VOX_TRY(const auto found, decoder.descend(voxel, decoder.stop));
+  VOX_TRY(const auto found, decoder.descend(voxel));
   if (!found.base_block) return decoded_value(found.value, info_.format);
   Voxel v;
   const Box one{voxel, voxel + Index3(1)};
@@ -208,21 +236,8 @@ Status Volume::decode(const Box& box, int level, VoxelSpan out) const {
 }
 
 std::optional<Voxel> Volume::uniform(const Box& box, int level) const {
-  if (box.empty() || levels_.size() == 1) return std::nullopt;
-  const Decoder decoder{*this, static_cast<size_t>(level)};
-  // The first corner's voxel must be terminal and reach the last corner. Blocks below that could not, are not
-  // looked at.
-  size_t floor = decoder.root();
-  while (floor > decoder.stop && floor > 1) {
-    const Index3 edge(decoder.scale(floor - 1));
-    if (box.lo / edge != (box.hi - Index3(1)) / edge) break;
-    --floor;
-  }
-  const Index3 edge(decoder.scale(floor));
-  if (box.lo / edge != (box.hi - Index3(1)) / edge) return std::nullopt;
-  const auto found = decoder.descend(box.lo, floor);
-  if (!found || found->base_block || !(found->terminal || found->level == decoder.stop)) return std::nullopt;
-  return decoded_value(found->value, info_.format);
+  if (box.empty()) return std::nullopt;
+  return Decoder{*this, static_cast<size_t>(level)}.uniform(box);
 }
 
 namespace {

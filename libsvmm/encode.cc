@@ -155,6 +155,15 @@ class Encoder {
   struct Tile {
     std::vector<BlockBuffer> levels;  // 0 .. tile_level_
     NodeGrid<F> nodes;                // one subblock of V_{tile_level_ + 1}
+
+    void clear(size_t level_count) {
+      levels.resize(level_count);
+      for (BlockBuffer& level : levels) {
+        level.bytes.clear();
+        level.blocks = level.terminal_voxels = 0;
+      }
+      nodes.reset(Index3(2));
+    }
   };
   /// Base voxels along the edge of one group of level k.
   int64_t group_edge(size_t k) const {
@@ -236,8 +245,7 @@ class Encoder {
     thread_local NodeGrid<F> grids[2];
     const int64_t edge = group_edge(tile_level_);
     const Box box = intersect({lo, lo + Index3(edge)}, info_.box());
-    tile.levels.assign(tile_level_ + 1, {});
-    tile.nodes.reset(Index3(2));
+    tile.clear(tile_level_ + 1);
     if (box.empty()) return {};
     if (!slab && uniform_tile(box, edge / 2, tile)) return {};
 

@@ -7,6 +7,7 @@
 #include <bit>
 #include <cmath>
 #include <cstdint>
+#include <limits>
 
 #include "formats/volume.h"
 #include "libsvmm/layout.h"
@@ -54,7 +55,7 @@ requires(is_colour(F)) struct Moments<F> {
     std::fill(hi, hi + channels, uint8_t{0});
   }
   void add(const std::byte* v, const Criterion& criterion) {
-    uint8_t c[4];
+    uint8_t c[4] = {};
     std::memcpy(c, v, channels);
     const uint32_t weight = criterion.alpha_weight ? c[3] : 1u;
     ++count;
@@ -192,7 +193,8 @@ struct Moments<VoxelFormat::float32> {
   bool uniform() const { return lo == hi; }
   Voxel value(const Criterion&) const {
     if (uniform()) return Voxel::of(from_key(lo));
-    return Voxel::of(finite ? static_cast<float>(sum / static_cast<double>(finite)) : from_key(hi));
+    return Voxel::of(finite ? static_cast<float>(sum / static_cast<double>(finite))
+                            : std::numeric_limits<float>::quiet_NaN());
   }
   bool within(const Voxel& v, const Criterion& criterion) const {
     if (uniform()) return true;

@@ -25,7 +25,7 @@ namespace voxkit::svmm {
 enum class Layout : uint8_t {
   thesis = 1,  ///< Table 2.1: 32 or 16 bit words that share value, terminal flag and block offset; 3-bit
                ///< alpha; RGBA32, RGB24 and DENSITY8 only; the root is reached as soon as one side is <= r
-  plain = 2,  ///< values in the volume's own format beside 64-bit links; root when all sides are <= r
+  plain = 2,   ///< values in the volume's own format beside 64-bit links; root when all sides are <= r
 };
 /// How the base level (level 0) is stored (section 2.1.1, last paragraph). All but raw are lossy.
 enum class Base : uint8_t {
@@ -102,7 +102,8 @@ class Volume {
   Result<Voxel> sample(Index3 voxel, int level = 0) const;
   /// Decodes `box`, in voxels of `level` and inside dims_at(level), depth first.
   Status decode(const Box& box, int level, VoxelSpan out) const;
-  /// The value of the box where one terminal voxel covers it; reads no more than one voxel a level.
+  /// The value of the box where terminal voxels of a single block cover it; nothing where finding out would
+  /// take decoding.
   std::optional<Voxel> uniform(const Box& box, int level) const;
   /// Verifies every checksum, every link and every count.
   Status check(Context& ctx) const;
