@@ -110,7 +110,7 @@ TEST_F(NrrdTest, EveryEncoding) {
   }
   for (const char* name : {"bzip2", "bz2"}) {
     put("v.nrrd", header({{"encoding", name}, {"line skip", "2"}, {"byteskip", "3"}}) + "\na line\n\n" +
-                      bzip2_text("123" + data_));
+                      bzip2_text(std::string("123").append(data_)));
     expect_voxels("v.nrrd", data_);
   }
   std::string text;
@@ -165,7 +165,8 @@ TEST_F(NrrdTest, DataInOtherFiles) {
                "expected 2 files, not 0");
 
   for (int i = 0; i < 6; ++i)
-    put("row_0" + std::to_string(8 - i) + ".x", "#" + data_.substr(static_cast<size_t>(4 * i), 4));
+    put("row_0" + std::to_string(8 - i) + ".x",
+        std::string("#").append(data_, static_cast<size_t>(4 * i), 4));
   put("v.nhdr", header({{"byte skip", "1"}, {"data file", "row_%02d.x 8 3 -1 1"}}));
   expect_voxels("v.nhdr", data_);
   expect_error(put("v.nhdr", header({{"data file", "row_%02d.x 8 3 -1"}})), "expected 2 files, not 6");
