@@ -9,6 +9,7 @@
 #include <string_view>
 #include <vector>
 
+#include "formats/output_file.h"
 #include "formats/readers.h"
 
 namespace voxkit {
@@ -66,6 +67,13 @@ Result<bool> holds_dicom(const std::string& folder) {
     if (file.read(head.data(), head.size()) && std::string_view(head.data() + 128, 4) == "DICM") return true;
   }
   return false;
+}
+
+auto unknown_output(const std::string& name) {
+  return fail(ErrorCode::usage, name,
+              "unknown kind of volume: expected one of .nrrd .nhdr .nii .nii.gz .vdb .raw .mrc .map .ccp4 "
+              ".rec, or a pattern "
+              "of images such as slice-%04d.tif");
 }
 
 }  // namespace
@@ -135,10 +143,12 @@ Result<std::unique_ptr<VolumeSink>> create_volume(const std::string& name, const
     case Kind::none:
       break;
   }
-  return fail(ErrorCode::usage, name,
-              "unknown kind of volume: expected one of .nrrd .nhdr .nii .nii.gz .vdb .raw .mrc .map .ccp4 "
-              ".rec, or a pattern "
-              "of images such as slice-%04d.tif");
+  return unknown_output(name);
+}
+
+Status check_volume_output(const std::string& name, bool force) {
+  if (name != "-" && kind_of(name) == Kind::none) return unknown_output(name);
+  return kind_of(name) == Kind::image ? Status{} : check_output(name, force);
 }
 
 }  // namespace voxkit

@@ -18,16 +18,23 @@ struct OpenOptions {
   std::string grid;                 ///< .vdb: name of the grid; empty: the first float or Vec3s grid
 };
 
-/// Opens a file or a built-in by its name; reads headers, no voxels. "-" is NRRD on standard input. Compressed volumes
-/// (.svmm …) are opened by the tools, since formats/ knows no codec.
+/// Opens a file or a built-in by its name; reads headers, no voxels. "-" is NRRD on standard input.
+/// Compressed volumes (.svmm …) are opened by the tools, since formats/ knows no codec.
 /// Errors: ErrorCode::input with file, section and rule; ErrorCode::usage for a name that cannot be an input.
-Result<std::unique_ptr<VolumeSource>> open_volume(const std::string& name, const OpenOptions& options, Context& ctx);
+Result<std::unique_ptr<VolumeSource>> open_volume(const std::string& name, const OpenOptions& options,
+                                                  Context& ctx);
 
 /// True if `name` is a built-in such as "menger:5" (which need not be well-formed).
 bool is_builtin(const std::string& name);
 
-/// Starts a volume file of the kind that `name` ends in: .nrrd .nhdr .nii .nii.gz .raw .mrc .vdb, a printf pattern of
-/// images (a folder for slices), "-" (NRRD). Refuses what the kind cannot hold (ErrorCode::usage) before creating anything.
-Result<std::unique_ptr<VolumeSink>> create_volume(const std::string& name, const VolumeInfo& info, bool force, Context& ctx);
+/// Starts a volume file of the kind that `name` ends in: .nrrd .nhdr .nii .nii.gz .raw .mrc .vdb, a printf
+/// pattern of images (a folder for slices), "-" (NRRD). Refuses what the kind cannot hold (ErrorCode::usage)
+/// before creating anything.
+Result<std::unique_ptr<VolumeSink>> create_volume(const std::string& name, const VolumeInfo& info, bool force,
+                                                  Context& ctx);
+
+/// The checks of `create_volume` that need no volume, for a tool to run before any work: the kind is known,
+/// and the file may be written (for images: looked at when their number is known).
+Status check_volume_output(const std::string& name, bool force);
 
 }  // namespace voxkit

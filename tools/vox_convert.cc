@@ -4,7 +4,6 @@
 #include "formats/convert.h"
 #include "formats/copy.h"
 #include "formats/open_volume.h"
-#include "formats/output_file.h"
 #include "formats/readers.h"
 #include "tools/common/input.h"
 #include "tools/common/json.h"
@@ -72,7 +71,7 @@ Result<int> work(Options& o, Run& run) {
   if (run.options.json && o.output == "-")
     return bad_usage("--json and the output - both use standard output");
   VOX_CHECK(check_distinct(o.input, o.output));
-  VOX_CHECK(check_output(o.output, run.options.force));
+  VOX_CHECK(check_volume_output(o.output, run.options.force));
 
   VOX_TRY(auto source, open(o, run.ctx));
   if (o.input == "-" && source->forward_only()) {

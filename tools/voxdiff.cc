@@ -4,7 +4,6 @@
 #include <limits>
 
 #include "formats/open_volume.h"
-#include "formats/output_file.h"
 #include "libmetrics/volume_diff.h"
 #include "tools/common/input.h"
 #include "tools/common/json.h"
@@ -27,7 +26,11 @@ void declare(CommandLine& line, Options& o) {
   line.option("--fail-psnr", "DB", "Exit 1 if the PSNR is below", number(o.fail_psnr, -largest, largest));
   line.option("--fail-max", "E", "Exit 1 if an absolute error is above", number(o.fail_max, 0, largest));
   line.option("--peak", "P", "Peak of the PSNR (default: full scale of A's format)",
-              number(o.peak, std::numeric_limits<double>::denorm_min(), largest));
+              [&o](const std::string& text) -> Status {
+                VOX_TRY(o.peak, read_number(text, -largest, largest));
+                return *o.peak > 0 ? Status{}
+                                   : bad_usage("\"" + text + "\": expected a number greater than 0");
+              });
   line.text("-o,--output", "ERR", "Write the absolute errors as a volume", o.errors);
   declare_input_options(line, o.open);
 }
@@ -70,7 +73,7 @@ Result<int> work(const Options& o, Run& run) {
     if (o.errors == "-") return bad_usage("the error volume cannot go to standard output: expected a file");
     VOX_CHECK(check_distinct(o.a, o.errors));
     VOX_CHECK(check_distinct(o.b, o.errors));
-    VOX_CHECK(check_output(o.errors, run.options.force));
+    VOX_CHECK(check_volume_output(o.errors, run.options.force));
   }
   VOX_TRY(const Input a, open_input(o.a, o.open, run.ctx));
   VOX_TRY(const Input b, open_input(o.b, o.open, run.ctx));

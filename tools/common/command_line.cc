@@ -130,14 +130,15 @@ Result<CommandLine::Outcome> CommandLine::parse(int argc, char** argv) {
     return Outcome{app.help(), {}};
   } catch (const CLI::CallForVersion& version) {
     return Outcome{std::string(version.what()) + "\n", {}};
-  } catch (const CLI::ExtrasError& error) {
+  } catch (const CLI::ParseError& error) {
+    // An unknown option is the likely cause of whatever else is wrong.
     for (const std::string& extra : app.remaining()) {
       if (extra.size() < 2 || extra[0] != '-') continue;
       const std::string name = extra.substr(0, extra.find('='));
       return bad_usage(fmt::format("unknown option {}: did you mean {}?", name, nearest_option(app, name)));
     }
-    return bad_usage(fmt::format("unexpected argument \"{}\": see --help", app.remaining().front()));
-  } catch (const CLI::ParseError& error) {
+    if (dynamic_cast<const CLI::ExtrasError*>(&error) != nullptr)
+      return bad_usage(fmt::format("unexpected argument \"{}\": see --help", app.remaining().front()));
     std::string what = error.what();
     while (!what.empty() && (what.back() == '\n' || what.back() == ' ')) what.pop_back();
     return bad_usage(what + (what.find("expected") == what.npos ? ": see --help" : ""));

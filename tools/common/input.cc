@@ -61,8 +61,9 @@ void declare_input_options(CommandLine& line, OpenOptions& options, bool type) {
   if (type) {
     line.option("--type", "TYPE", "Type of a .raw input: u8 i8 u16 i16 u32 i32 f32 f64 rgb8 rgba8 bit",
                 [&options](const std::string& text) -> Status {
-                  options.type = text;
-                  return {};
+                  options.type.emplace();
+                  return one_of(*options.type, {"u8", "i8", "u16", "i16", "u32", "i32", "f32", "f64", "rgb8",
+                                                "rgba8", "bit"})(text);
                 });
   }
   line.option("--endian", "big|little", "Byte order of a .raw input",
