@@ -8,6 +8,7 @@
 #include <sys/stat.h>
 #include <unistd.h>
 
+#include <algorithm>
 #include <cerrno>
 #include <cstdlib>
 #include <cstring>
@@ -81,6 +82,31 @@ Result<std::shared_ptr<const MappedFile>> MappedFile::spool(InputStream& stream)
 
 MappedFile::~MappedFile() {
   if (!bytes_.empty()) ::munmap(const_cast<std::byte*>(bytes_.data()), bytes_.size());
+}
+
+namespace {
+
+class MappedStream final : public InputStream {
+ public:
+  explicit MappedStream(std::shared_ptr<const MappedFile> file) : file_(std::move(file)) {
+    name_ = file_->name();
+  }
+  Result<size_t> read(std::span<std::byte> out) override {
+    const auto rest = file_->bytes().subspan(position_);
+    const size_t count = std::min(out.size(), rest.size());
+    std::copy_n(rest.begin(), count, out.begin());
+    position_ += count;
+    return count;
+  }
+
+ private:
+  std::shared_ptr<const MappedFile> file_;
+};
+
+}  // namespace
+
+std::unique_ptr<InputStream> stream_of(std::shared_ptr<const MappedFile> file) {
+  return std::make_unique<MappedStream>(std::move(file));
 }
 
 }  // namespace voxkit

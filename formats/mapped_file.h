@@ -29,4 +29,7 @@ class MappedFile {
   std::string name_;
 };
 
+/// The bytes of a mapped file front to back; any number of streams can read one file.
+std::unique_ptr<InputStream> stream_of(std::shared_ptr<const MappedFile> file);
+
 }  // namespace voxkit

@@ -28,6 +28,7 @@ struct Sums {
     double squares = 0, absolute = 0, signal = 0;
   } real;
   double greatest = 0;                   ///< absolute error
+  uint64_t farthest = 0;                 ///< squared distance of two colours
   double lo = infinity, hi = -infinity;  ///< finite sample values of A
   uint64_t differing = 0;                ///< voxels
 
@@ -42,6 +43,7 @@ struct Sums {
     real.absolute += s.real.absolute * static_cast<double>(times);
     real.signal += s.real.signal * static_cast<double>(times);
     greatest = std::max(greatest, s.greatest);
+    farthest = std::max(farthest, s.farthest);
     lo = std::min(lo, s.lo);
     hi = std::max(hi, s.hi);
     differing += s.differing * times;
@@ -161,7 +163,7 @@ class Comparison {
 
   void colours(const std::byte* a, const std::byte* b, int64_t n, std::byte* errors, Sums& sums) const {
     const int bytes_a = voxel_bytes(a_), bytes_b = voxel_bytes(b_), bytes = std::max(bytes_a, bytes_b);
-    uint64_t squares = 0, rgb_squares = 0, absolute = 0, signal = 0, differing = 0;
+    uint64_t squares = 0, rgb_squares = 0, absolute = 0, signal = 0, differing = 0, farthest = 0;
     int greatest = 0;
     for (int64_t i = 0; i < n; ++i, a += bytes_a, b += bytes_b) {
       uint64_t voxel = 0, voxel_rgb = 0;
@@ -179,10 +181,12 @@ class Comparison {
       squares += voxel;
       rgb_squares += voxel_rgb;
       differing += voxel != 0;
+      farthest = std::max(farthest, voxel);
     }
     Sums part;
     part.whole = {squares, rgb_squares, absolute, signal};
     part.greatest = greatest;
+    part.farthest = farthest;
     part.differing = differing;
     sums.merge(part);
   }
@@ -209,6 +213,7 @@ VolumeDiff summarise(const Sums& sums, const VolumeInfo& a, int channels, std::o
   diff.snr_db =
       decibels((static_cast<double>(sums.whole.signal) + sums.real.signal) / samples_count, diff.mse);
   diff.max_abs_error = sums.greatest;
+  diff.max_distance = is_colour(a.format) ? std::sqrt(static_cast<double>(sums.farthest)) : sums.greatest;
   diff.mean_abs_error = (static_cast<double>(sums.whole.absolute) + sums.real.absolute) / samples_count;
   diff.differing_voxels = sums.differing;
   if (is_colour(a.format)) {

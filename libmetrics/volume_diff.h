@@ -20,6 +20,7 @@ struct VolumeDiff {
   double psnr_db = 0;          ///< 10 log10(peak^2 / mse); infinite where nothing differs
   double snr_db = 0;           ///< 10 log10(mean square of A / mse)
   double max_abs_error = 0, mean_abs_error = 0;
+  double max_distance = 0;  ///< greatest Euclidean distance of two voxels; for scalars max_abs_error
   uint64_t differing_voxels = 0;  ///< voxels whose bytes differ (of different formats: whose values differ)
   std::optional<double> grmse;    ///< colours: sqrt(sum of squared R, G, B errors / 3 voxels)
   std::optional<double> grmse_distance;  ///< colours: sqrt(sum of squared R, G, B errors / voxels)

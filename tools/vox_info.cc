@@ -8,6 +8,7 @@
 #include "tools/common/input.h"
 #include "tools/common/json.h"
 #include "tools/common/main.h"
+#include "tools/common/svmm_report.h"
 
 namespace voxkit::cli {
 namespace {
@@ -41,45 +42,10 @@ std::string_view name(SampleType type) {
                                         "i32", "u64", "i64", "f32", "f64", "bit"};
   return names[static_cast<size_t>(type)];
 }
-std::string_view name(svmm::Layout layout) {
-  return layout == svmm::Layout::thesis ? "thesis" : "plain";
-}
-std::string_view name(svmm::Bound bound) {
-  return bound == svmm::Bound::local ? "local" : "global";
-}
-std::string_view name(svmm::Base base) {
-  switch (base) {
-    case svmm::Base::raw:
-      return "raw";
-    case svmm::Base::bitmap:
-      return "bitmap";
-    case svmm::Base::alpha:
-      return "alpha";
-    case svmm::Base::gray:
-      return "gray";
-    case svmm::Base::bc1:
-      return "bc1";
-  }
-  return "?";
-}
-
 std::string letters(uint32_t kind) {
   std::string text;
   for (int i = 0; i < 4; ++i) text += static_cast<char>(kind >> (8 * i) & 0xff);
   return text;
-}
-
-/// The parameters as the JSON object `params`.
-Json params_json(const svmm::Params& p) {
-  Json widths = Json::array();
-  for (const int w : p.blockwidths) widths.push(int64_t{w});
-  Json json = Json::object();
-  json.set("layout", name(p.layout)).set("base", name(p.base)).set("bound", name(p.bound));
-  json.set("alpha_weight", p.alpha_weight)
-      .set("blockwidths", std::move(widths))
-      .set("rootwidth", p.rootwidth);
-  json.set("quality", p.quality).set("delta", p.delta).set("full_scale", p.full_scale);
-  return json;
 }
 
 Json json_of(const Options& o, const Run& run, const Input& input, std::optional<uint64_t> bytes) {
@@ -116,20 +82,7 @@ Json json_of(const Options& o, const Run& run, const Input& input, std::optional
   }
   json.set("chunks", std::move(chunks));
   if (input.svmm) {
-    Json levels = Json::array();
-    int64_t index = 0;
-    for (const svmm::Level& l : input.svmm->levels()) {
-      Json level = Json::object();
-      level.set("index", index++)
-          .set("blockwidth", l.blockwidth)
-          .set("mip_factor", l.mip_factor)
-          .set("dims", l.dims);
-      level.set("blocks", l.blocks)
-          .set("block_bytes", l.block_bytes)
-          .set("terminal_voxels", l.terminal_voxels);
-      levels.push(std::move(level));
-    }
-    json.set("levels", std::move(levels));
+    json.set("levels", levels_json(input.svmm->levels()));
   }
   if (o.check) json.set("checked", true);
   return json;
@@ -154,7 +107,7 @@ std::string text_of(const Options& o, const Input& input, std::optional<uint64_t
     const svmm::Params& p = input.svmm->params();
     text +=
         fmt::format("params      layout {}, base {}, bound {}, quality {:.6g}, delta {:.6g}, rootwidth {}\n",
-                    name(p.layout), name(p.base), name(p.bound), p.quality, p.delta, p.rootwidth);
+                    cli::name(p.layout), cli::name(p.base), cli::name(p.bound), p.quality, p.delta, p.rootwidth);
     text += "level  width  factor  dims                    blocks  block bytes  terminal voxels\n";
     int index = 0;
     for (const svmm::Level& l : input.svmm->levels())

@@ -95,6 +95,16 @@ Result<Input> open_compressed(const std::string& name, int level, Context&) {
   return open_svmm(std::move(container), level);
 }
 
+Result<Input> open_spooled(std::shared_ptr<const MappedFile> file, Context& ctx) {
+  if (is_container(file->bytes())) {
+    VOX_TRY(auto container, container_of(std::move(file)));
+    return open_svmm(std::move(container), 0);
+  }
+  Input input;
+  VOX_TRY(input.source, open_nrrd(stream_of(std::move(file)), ctx));
+  return input;
+}
+
 Result<Input> open_input(const std::string& name, const OpenOptions& options, Context& ctx) {
   if (is_compressed(name)) return open_compressed(name, 0, ctx);
   Input input;
@@ -108,8 +118,7 @@ Result<Input> open_input(const std::string& name, const OpenOptions& options, Co
     return input;
   }
   VOX_TRY(auto file, MappedFile::spool(*peeked.stream));
-  VOX_TRY(auto container, container_of(std::move(file)));
-  return open_svmm(std::move(container), 0);
+  return open_spooled(std::move(file), ctx);
 }
 
 std::optional<uint64_t> file_bytes(const std::string& name) {

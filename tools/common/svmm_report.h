@@ -1,0 +1,21 @@
+// What the tools say about SVMM files.
+#pragma once
+
+#include <span>
+#include <string_view>
+
+#include "libsvmm/svmm.h"
+#include "tools/common/json.h"
+
+namespace voxkit::cli {
+
+std::string_view name(svmm::Layout layout);
+std::string_view name(svmm::Base base);
+std::string_view name(svmm::Bound bound);
+
+/// The JSON object `params`.
+Json params_json(const svmm::Params& params);
+/// The JSON array `levels`.
+Json levels_json(std::span<const svmm::Level> levels);
+
+}  // namespace voxkit::cli

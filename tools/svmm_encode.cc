@@ -1,0 +1,219 @@
+// svmm-encode: a volume as sparse voxel mip-maps.
+#include <fmt/core.h>
+
+#include <algorithm>
+#include <cmath>
+#include <cstdio>
+
+#include "formats/copy.h"
+#include "formats/full_scale.h"
+#include "formats/output_file.h"
+#include "libmetrics/volume_diff.h"
+#include "libsvmm/svmm.h"
+#include "tools/common/input.h"
+#include "tools/common/main.h"
+#include "tools/common/svmm_report.h"
+
+namespace voxkit::cli {
+namespace {
+
+struct Options {
+  std::string input, output;
+  OpenOptions open;
+  std::vector<int64_t> blockwidths = {0};
+  int64_t rootwidth = 32;
+  std::optional<double> quality, delta;
+  std::string base = "raw", layout = "plain", bound, alpha_weight;
+  std::optional<ValueRange> range;
+  bool verify = false;
+};
+
+void declare(CommandLine& line, Options& o) {
+  line.argument("INPUT", "Volume file, folder or pattern of images, built-in such as menger:5, or -",
+                o.input);
+  line.text("-o,--output", "OUT", "Output (.svmm), or -", o.output, true);
+  line.option("-w,--blockwidth", "W[,W...]",
+              "Block widths, powers of two, base level first, the last for all levels above; 0: stepped 2, "
+              "4, 8 ... (0)",
+              [&o](const std::string& text) -> Status {
+                VOX_TRY(o.blockwidths, read_integers(text, 0, svmm::max_blockwidth));
+                return {};
+              });
+  line.option("-r,--rootwidth", "R", "The level with no side above R is the root (32)",
+              integer(o.rootwidth, 1, max_side));
+  line.option("-q,--quality", "Q", "0 to 100; 100 is lossless (90)", number(o.quality, 0, 100));
+  line.option("--delta", "D", "In place of a quality: distance allowed, as a fraction of full scale",
+              number(o.delta, 0, 1e9));
+  line.option("-b,--base", "BASE", "Base level: raw bitmap alpha gray bc1 (raw)",
+              one_of(o.base, {"raw", "bitmap", "alpha", "gray", "bc1"}));
+  line.option("--layout", "LAYOUT", "plain, or thesis: the published bits, sizes and stop rule (plain)",
+              one_of(o.layout, {"plain", "thesis"}));
+  line.option(
+      "--bound", "BOUND",
+      "global: no voxel is further than delta from the original; local: than from the level below (global)",
+      one_of(o.bound, {"local", "global"}));
+  line.option("--alpha-weight", "on|off", "Weigh colours by alpha in averages (on; thesis: off)",
+              one_of(o.alpha_weight, {"on", "off"}));
+  line.option("--range", "LO,HI",
+              "Sample values of 16 bit and float volumes that are full scale (default: measured)",
+              [&o](const std::string& text) -> Status {
+                VOX_TRY(const auto ends, read_numbers(text, 2));
+                if (!(ends[0] < ends[1]))
+                  return bad_usage("\"" + text + "\": expected LO,HI with LO less than HI");
+                o.range = ValueRange{ends[0], ends[1]};
+                return {};
+              });
+  line.flag("--verify",
+            "Decode and compare before the output appears; exit 1 if the promised bound is broken", o.verify);
+  declare_input_options(line, o.open);
+}
+
+/// Everything but full_scale, which may need the voxels.
+Result<svmm::Params> params_of(const Options& o, VoxelFormat format) {
+  using namespace svmm;
+  Params params;
+  params.layout = o.layout == "thesis" ? Layout::thesis : Layout::plain;
+  for (const Base base : {Base::raw, Base::bitmap, Base::alpha, Base::gray, Base::bc1})
+    if (name(base) == o.base) params.base = base;
+  const bool thesis = params.layout == Layout::thesis;
+  params.bound = o.bound == "local" || (o.bound.empty() && thesis) ? Bound::local : Bound::global;
+  params.alpha_weight = o.alpha_weight == "on" || (o.alpha_weight.empty() && !thesis);
+  if (o.blockwidths != std::vector<int64_t>{0}) {
+    for (const int64_t w : o.blockwidths) params.blockwidths.push_back(static_cast<int>(w));
+  }
+  params.rootwidth = o.rootwidth;
+  if (o.quality && o.delta) return bad_usage("--quality and --delta: expected one of them");
+  params.quality = o.delta ? -1 : o.quality.value_or(90);
+  params.delta = o.delta ? *o.delta : delta_of_quality(params.quality, format, params.layout);
+  return params;
+}
+
+/// Opens the input, any number of times: standard input is spooled to disk if it may be wanted twice.
+class Inputs {
+ public:
+  Inputs(const Options& o, Context& ctx) : options_(o), ctx_(ctx) {}
+  Result<std::unique_ptr<VolumeSource>> open(bool wanted_again) {
+    if (options_.input != "-" || (!wanted_again && !spooled_)) {
+      VOX_TRY(Input input, open_input(options_.input, options_.open, ctx_));
+      return std::move(input.source);
+    }
+    if (!spooled_) {
+      VOX_TRY(auto stream, open_stream("-"));
+      VOX_TRY(spooled_, MappedFile::spool(*stream));
+    }
+    VOX_TRY(Input input, open_spooled(spooled_, ctx_));
+    return std::move(input.source);
+  }
+
+ private:
+  const Options& options_;
+  Context& ctx_;
+  std::shared_ptr<const MappedFile> spooled_;
+};
+
+/// Lossless means identical; bound global with a raw base promises a distance.
+bool keeps_promise(const svmm::Params& params, const VolumeDiff& diff) {
+  if (params.base != svmm::Base::raw || params.layout != svmm::Layout::plain)
+    return true;  // these promise nothing
+  if (params.delta == 0) return diff.differing_voxels == 0;
+  return params.bound == svmm::Bound::local || diff.max_distance <= params.delta * params.full_scale;
+}
+
+Json json_of(const Options& o, const Run& run, const VolumeInfo& info, const svmm::Params& params,
+             std::span<const svmm::Level> levels, uint64_t file_bytes, double seconds,
+             const std::optional<VolumeDiff>& diff) {
+  const double raw = static_cast<double>(raw_bytes(info)), bytes = static_cast<double>(file_bytes);
+  Json json = Json::result();
+  json.set("tool", run.tool).set("version", version_text()).set("input", o.input).set("output", o.output);
+  json.set("dims", info.dims).set("voxel_format", name(info.format)).set("raw_bytes", raw_bytes(info));
+  json.set("file_bytes", file_bytes).set("percent", 100 * bytes / raw).set("ratio", raw / bytes);
+  json.set("bits_per_voxel", 8 * bytes / static_cast<double>(*checked_voxels(info.dims)));
+  json.set("encode_seconds", seconds).set("input_mb_per_s", raw / 1e6 / seconds);
+  json.set("peak_rss_bytes", peak_rss_bytes())
+      .set("params", params_json(params))
+      .set("threads", run.options.threads);
+  if (params.layout == svmm::Layout::thesis) json.set("thesis_bytes", svmm::thesis_bytes(levels));
+  json.set("levels", levels_json(levels));
+  if (diff)
+    json.set("rmse", diff->rmse).set("psnr_db", diff->psnr_db).set("max_abs_error", diff->max_abs_error);
+  return json;
+}
+
+Result<int> work(const Options& o, Run& run) {
+  if (run.options.json && o.output == "-")
+    return bad_usage("--json and the output - both use standard output");
+  VOX_CHECK(check_output(o.output, run.options.force));
+  VOX_CHECK(check_distinct(o.input, o.output));
+  if (o.verify && o.output == "-")
+    return bad_usage("--verify: cannot read back what went to standard output: name a file");
+
+  Inputs inputs(o, run.ctx);
+  const bool lossless = o.delta ? *o.delta == 0 : o.quality.value_or(90) == 100;
+  VOX_TRY(auto source, inputs.open(o.verify || (!lossless && !o.range)));
+  const VolumeInfo info = source->info();
+  VOX_TRY(svmm::Params params, params_of(o, info.format));
+  VOX_CHECK(svmm::validate(params, info));
+  ValueRange range{0, 1};
+  if (o.range) {
+    range = {o.range->lo + info.bias(), o.range->hi + info.bias()};
+  } else if (!lossless && (info.format == VoxelFormat::density16 || info.format == VoxelFormat::float32)) {
+    run.stage("measure");
+    VOX_TRY(range, measure_range(*source, run.ctx));
+    if (source->forward_only()) {
+      VOX_TRY(source, inputs.open(true));
+    }
+  }
+  params.full_scale = full_scale(info, range);
+
+  VOX_TRY(auto out, OutputFile::create(o.output, run.options.force));
+  run.stage("encode");
+  const double start = run.seconds();
+  VOX_TRY(const auto levels, svmm::encode(
+                                 *source, params, [&](auto bytes) { return out->write(bytes); }, run.ctx));
+  const double seconds = run.seconds() - start;
+  const uint64_t file_bytes = out->position();
+
+  std::optional<VolumeDiff> diff;
+  if (o.verify) {
+    run.stage("verify");
+    if (source->forward_only()) {
+      VOX_TRY(source, inputs.open(true));
+    }
+    VOX_TRY(const Input decoded, open_compressed(out->temporary(), 0, run.ctx));
+    VOX_TRY(diff, diff_volumes(*source, *decoded.source, std::nullopt, nullptr, run.ctx));
+    if (!keeps_promise(params, *diff)) {
+      report(run.tool,
+             {ErrorCode::internal, o.output,
+              fmt::format("verification failed: greatest error {}: expected at most {}; nothing was written",
+                          diff->max_distance, params.delta * params.full_scale)});
+      return 1;
+    }
+  }
+  VOX_CHECK(out->commit());
+  if (run.options.json)
+    VOX_CHECK(print(json_of(o, run, info, params, levels, file_bytes, seconds, diff).text()));
+  if (!run.options.quiet && !run.options.json) {
+    const double raw = static_cast<double>(raw_bytes(info));
+    fmt::print(
+        stderr, "{}: {} -> {} bytes ({:.4g} %) in {:.2f} s{}\n", o.output, raw_bytes(info), file_bytes,
+        100 * static_cast<double>(file_bytes) / raw, seconds,
+        diff ? fmt::format(", {} dB, greatest error {:.6g}", readable(diff->psnr_db), diff->max_abs_error)
+             : "");
+  }
+  return 0;
+}
+
+}  // namespace
+}  // namespace voxkit::cli
+
+int main(int argc, char** argv) {
+  using namespace voxkit::cli;
+  Options options;
+  return run_tool(
+      argc, argv, "svmm-encode", "Compresses a volume as sparse voxel mip-maps.",
+      "  svmm-encode head.nii.gz -o head.svmm\n"
+      "  svmm-encode head.nii.gz -o head.svmm --quality 100 --verify\n"
+      "  svmm-encode menger:6 -o menger.svmm --blockwidth 4 --base bitmap --quality 80\n"
+      "  svmm-encode scan.raw --dims 512,512,361 --type u16 -o - --quality 95 > scan.svmm\n",
+      [&](CommandLine& line) { declare(line, options); }, [&](Run& run) { return work(options, run); });
+}
