@@ -1,0 +1,19 @@
+// Small valid files of each kind: what the fuzzers start from and hostile_test.cc damages.
+#pragma once
+
+#include <string>
+#include <vector>
+
+namespace voxkit::fuzz {
+
+std::vector<std::string> nrrd_seeds();
+std::vector<std::string> nifti_seeds();
+std::vector<std::string> mrc_seeds();
+std::vector<std::string> raw_seeds();
+std::vector<std::string> gunzip_seeds();
+std::vector<std::string> bunzip2_seeds();
+std::vector<std::string> image_seeds();
+std::vector<std::string> openvdb_seeds();
+std::vector<std::string> dicom_seeds();
+
+}  // namespace voxkit::fuzz
