@@ -57,7 +57,6 @@ struct CommandLine::State {
 CommandLine::CommandLine(const std::string& tool, const std::string& purpose, const std::string& examples)
     : state_(std::make_unique<State>(tool, purpose)) {
   CLI::App& app = state_->app;
-  CommonOptions& options = state_->options;
   app.set_help_flag("-h,--help", "Show this help");
   app.set_version_flag("-V,--version", tool + " " + version_text(), "Show the version");
   app.get_formatter()->column_width(34);
@@ -65,27 +64,6 @@ CommandLine::CommandLine(const std::string& tool, const std::string& purpose, co
       "Examples:\n" + examples +
       "\nExit codes: 0 done; 1 the check answered no; 2 usage; 3 input unreadable; 4 output cannot be\n"
       "written, or exists; 5 a limit was reached; 70 a bug of ours.");
-  options.threads = 0;
-  const auto quiet = app.add_flag("-q,--quiet", options.quiet, "Print nothing but errors");
-  app.add_flag("-v,--verbose", options.verbose, "Print more detail on standard error")->excludes(quiet);
-  option("-j,--threads", "N", "Worker threads; 0: all that this process may use (also VOX_THREADS)",
-         integer(options.threads, 0, 4096));
-  flag("-f,--force", "Overwrite an existing output", options.force);
-  flag("--json", "Print the result as one JSON object", options.json);
-  option("--progress", "auto|plain|never", "Progress on standard error; plain: key=value lines",
-         [&options](const std::string& text) -> Status {
-           std::string word;
-           VOX_CHECK(one_of(word, {"auto", "plain", "never"})(text));
-           options.progress = word == "auto"    ? ProgressMode::automatic
-                              : word == "plain" ? ProgressMode::plain
-                                                : ProgressMode::never;
-           return {};
-         });
-  option("--max-memory", "SIZE", "Refuse to use more memory for voxels, such as 512M or 3G",
-         [&options](const std::string& text) -> Status {
-           VOX_TRY(options.max_memory, read_size(text));
-           return {};
-         });
 }
 
 CommandLine::~CommandLine() = default;
@@ -122,8 +100,41 @@ void CommandLine::argument(const std::string& metavar, const std::string& help, 
   state_->app.add_option(metavar, value, help)->required()->type_name("");
 }
 
+void CommandLine::declare_common() {
+  CLI::App& app = state_->app;
+  CommonOptions& options = state_->options;
+  // A tool may have given a short name another meaning: -q is the quality of encoders.
+  const auto free_names = [&app](const std::string& short_name, const std::string& long_name) {
+    return app.get_option_no_throw(short_name) == nullptr ? short_name + "," + long_name : long_name;
+  };
+  options.threads = 0;
+  const auto quiet = app.add_flag(free_names("-q", "--quiet"), options.quiet, "Print nothing but errors");
+  app.add_flag(free_names("-v", "--verbose"), options.verbose, "Print more detail on standard error")
+      ->excludes(quiet);
+  option(free_names("-j", "--threads"), "N",
+         "Worker threads; 0: all that this process may use (also VOX_THREADS)",
+         integer(options.threads, 0, 4096));
+  flag(free_names("-f", "--force"), "Overwrite an existing output", options.force);
+  flag("--json", "Print the result as one JSON object", options.json);
+  option("--progress", "auto|plain|never", "Progress on standard error; plain: key=value lines",
+         [&options](const std::string& text) -> Status {
+           std::string word;
+           VOX_CHECK(one_of(word, {"auto", "plain", "never"})(text));
+           options.progress = word == "auto"    ? ProgressMode::automatic
+                              : word == "plain" ? ProgressMode::plain
+                                                : ProgressMode::never;
+           return {};
+         });
+  option("--max-memory", "SIZE", "Refuse to use more memory for voxels, such as 512M or 3G",
+         [&options](const std::string& text) -> Status {
+           VOX_TRY(options.max_memory, read_size(text));
+           return {};
+         });
+}
+
 Result<CommandLine::Outcome> CommandLine::parse(int argc, char** argv) {
   CLI::App& app = state_->app;
+  declare_common();
   try {
     app.parse(argc, argv);
   } catch (const CLI::CallForHelp&) {

@@ -24,6 +24,7 @@ struct CommonOptions {
 };
 
 /// Declares options, then reads argv. Values are stored by the parsers, whose targets must live until then.
+/// Where a tool uses a short name that the common options have as well, theirs is the long name only.
 class CommandLine {
  public:
   /// `purpose`: one sentence. `examples`: lines of runnable commands, one for each main use.
@@ -48,6 +49,8 @@ class CommandLine {
   Result<Outcome> parse(int argc, char** argv);
 
  private:
+  void declare_common();
+
   struct State;
   std::unique_ptr<State> state_;
 };
