@@ -13,6 +13,7 @@
 #include <map>
 #include <optional>
 #include <set>
+#include <string_view>
 #include <system_error>
 
 #include "formats/dense_source.h"
@@ -20,6 +21,7 @@
 #include "formats/natural_order.h"
 #include "formats/parallel.h"
 #include "formats/sliced_source.h"
+#include "formats/tiff_pages.h"
 
 namespace voxkit {
 namespace {
@@ -276,7 +278,12 @@ class ImageStack : public SlicedSource {
     stack->kind_ = *kind;
     int64_t slices = static_cast<int64_t>(stack->files_.size());
     if (pages) {
-      VOX_TRY(slices, stack->count_pages(*first));
+      if (std::string_view(first->format_name()) == "tiff") {
+        VOX_TRY(slices, count_tiff_pages(stack->files_.front()));
+      }
+      if (slices > INT32_MAX || !first->seek_subimage(static_cast<int>(slices - 1), 0))
+        return bad_input(stack->files_.front(), one_line(first->geterror()));
+      VOX_CHECK(stack->check(first->spec(), stack->files_.front(), static_cast<int>(slices - 1)));
       stack->idle_.push_back(std::move(first));
     } else if (slices > 1) {
       VOX_TRY(const auto last, open_image(stack->files_.back(), stack->limit_));
@@ -320,13 +327,6 @@ class ImageStack : public SlicedSource {
     return bad_input(
         path, fmt::format("{} is {}: expected {}, like the first",
                           pages_ ? fmt::format("page {}", page) : "slice", describe(spec), describe(spec_)));
-  }
-
-  Result<int64_t> count_pages(ImageInput& input) const {
-    int pages = 1;
-    for (; input.seek_subimage(pages, 0); ++pages) VOX_CHECK(check(input.spec(), files_.front(), pages));
-    const std::string error = input.geterror();
-    return pages;
   }
 
   Result<std::unique_ptr<ImageInput>> take() {

@@ -1,10 +1,16 @@
 // OpenVDB files: sparse grids of floats (densities) and of Vec3s (colours).
+#include <openvdb/util/logging.h>
+// What the library's templates say about damaged files goes to standard error, which is ours.
+#undef OPENVDB_LOG_WARN
+#define OPENVDB_LOG_WARN(message) static_cast<void>(0)
 #include <fmt/format.h>
 #include <openvdb/io/Archive.h>
 #include <openvdb/io/GridDescriptor.h>
 #include <openvdb/openvdb.h>
 
 #include <cmath>
+#include <cstdlib>
+#include <cstring>
 #include <fstream>
 #include <mutex>
 #include <vector>
@@ -30,6 +36,8 @@ void register_types() {
   static std::once_flag once;
   std::call_once(once, [] {
     namespace math = openvdb::math;
+    // Else the logger of the library complains, on standard error, that it has nowhere to log to.
+    setenv("LOG4CPLUS_LOGLOG_QUIETMODE", "true", /*overwrite=*/0);
     math::MapRegistry::registerMap(math::AffineMap::mapType(), math::AffineMap::create);
     math::MapRegistry::registerMap(math::UnitaryMap::mapType(), math::UnitaryMap::create);
     math::MapRegistry::registerMap(math::ScaleMap::mapType(), math::ScaleMap::create);
