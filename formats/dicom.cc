@@ -1,20 +1,25 @@
 // Folders of DICOM slices by GDCM: one series of CT, MR or other scalar images, put in order by where they
 // lie in the patient.
 #include <fmt/format.h>
-#include <gdcmImageReader.h>
-#include <gdcmReader.h>
+#include <gdcmDataElement.h>
+#include <gdcmJPEG2000Codec.h>
+#include <gdcmJPEGCodec.h>
+#include <gdcmJPEGLSCodec.h>
+#include <gdcmSequenceOfFragments.h>
 #include <gdcmTrace.h>
 #include <gdcmTransferSyntax.h>
 
 #include <algorithm>
-#include <charconv>
 #include <cmath>
 #include <filesystem>
 #include <fstream>
 #include <map>
 #include <set>
+#include <span>
 #include <system_error>
 
+#include "formats/dicom_header.h"
+#include "formats/dicom_rle.h"
 #include "formats/module.h"
 #include "formats/natural_order.h"
 #include "formats/sliced_source.h"
@@ -23,121 +28,9 @@ namespace voxkit {
 namespace {
 
 namespace fs = std::filesystem;
-using gdcm::Tag;
-
-/// What a slice's header says.
-struct SliceHeader {
-  std::string path, series, photometric;
-  int64_t columns = 0, rows = 0, samples = 1;
-  double frames = 1;
-  int bits_allocated = 0, bits_stored = 0, high_bit = 0;
-  bool is_signed = false, encapsulated = false;
-  double slope = 1, intercept = 0;
-  std::optional<int64_t> instance;
-  std::vector<double> position;       ///< 3, in mm, or none
-  std::vector<double> orientation;    ///< 6: directions of a row and of a column, or none
-  std::vector<double> pixel_spacing;  ///< 2: between rows, between columns, or none
-  double thickness = 1;
-
-  int64_t slice_bytes() const { return columns * rows * (bits_allocated / 8); }
-};
-
-/// The elements of a data set as numbers and text. Values are taken from their bytes: a damaged file may give
-/// an element any length and type.
-class Elements {
- public:
-  explicit Elements(const gdcm::DataSet& set) : set_(set) {}
-
-  std::string text(uint16_t group, uint16_t element) const {
-    const gdcm::ByteValue* bytes = value(group, element);
-    if (!bytes || !bytes->GetPointer()) return {};
-    std::string text(bytes->GetPointer(), bytes->GetLength());
-    const auto padding = [](char c) { return c == ' ' || c == '\0'; };
-    while (!text.empty() && padding(text.back())) text.pop_back();
-    text.erase(text.begin(), std::find_if_not(text.begin(), text.end(), padding));
-    return text;
-  }
-  std::optional<int> number(uint16_t group, uint16_t element) const {
-    const gdcm::ByteValue* bytes = value(group, element);
-    if (!bytes || !bytes->GetPointer() || bytes->GetLength() < 2) return std::nullopt;
-    uint16_t number;
-    std::memcpy(&number, bytes->GetPointer(), sizeof number);
-    return number;
-  }
-  /// Decimal numbers separated by backslashes: exactly `count` finite ones, or none.
-  std::vector<double> decimals(uint16_t group, uint16_t element, size_t count) const {
-    const std::string all = text(group, element);
-    std::vector<double> numbers;
-    for (const char *p = all.data(), *end = p + all.size(); p < end;) {
-      while (p < end && (*p == ' ' || *p == '+')) ++p;
-      double number = 0;
-      const auto [stop, error] = std::from_chars(p, end, number);
-      if (error != std::errc() || !std::isfinite(number)) return {};
-      numbers.push_back(number);
-      p = stop;
-      while (p < end && *p == ' ') ++p;
-      if (p < end && *p++ != '\\') return {};
-    }
-    return numbers.size() == count ? numbers : std::vector<double>();
-  }
-  double decimal(uint16_t group, uint16_t element, double otherwise) const {
-    const auto one = decimals(group, element, 1);
-    return one.empty() ? otherwise : one[0];
-  }
-
- private:
-  const gdcm::ByteValue* value(uint16_t group, uint16_t element) const {
-    const Tag tag(group, element);
-    return set_.FindDataElement(tag) ? set_.GetDataElement(tag).GetByteValue() : nullptr;
-  }
-  const gdcm::DataSet& set_;
-};
-
-bool has_dicom_magic(const std::string& path) {
-  char head[132] = {};
-  std::ifstream file(path, std::ios_base::binary);
-  return file.read(head, sizeof head) && std::equal(head + 128, head + 132, "DICM");
-}
-
-/// The header of an image, or nothing where a DICOM file is none (a DICOMDIR, a report).
-Result<std::optional<SliceHeader>> read_header(const std::string& path) {
-  gdcm::Reader reader;
-  reader.SetFileName(path.c_str());
-  static const std::set<Tag> wanted = {
-      Tag(0x0018, 0x0050), Tag(0x0018, 0x0088), Tag(0x0020, 0x000e), Tag(0x0020, 0x0013), Tag(0x0020, 0x0032),
-      Tag(0x0020, 0x0037), Tag(0x0028, 0x0002), Tag(0x0028, 0x0004), Tag(0x0028, 0x0008), Tag(0x0028, 0x0010),
-      Tag(0x0028, 0x0011), Tag(0x0028, 0x0030), Tag(0x0028, 0x0100), Tag(0x0028, 0x0101), Tag(0x0028, 0x0102),
-      Tag(0x0028, 0x0103), Tag(0x0028, 0x1052), Tag(0x0028, 0x1053)};
-  if (!reader.ReadSelectedTags(wanted))
-    return bad_input(path, "corrupt DICOM file: its header cannot be read");
-  const Elements elements(reader.GetFile().GetDataSet());
-  if (!elements.number(0x0028, 0x0010) || !elements.number(0x0028, 0x0011)) return std::nullopt;
-  SliceHeader header;
-  header.path = path;
-  header.rows = *elements.number(0x0028, 0x0010);
-  header.columns = *elements.number(0x0028, 0x0011);
-  header.series = elements.text(0x0020, 0x000e);
-  header.photometric = elements.text(0x0028, 0x0004);
-  header.samples = elements.number(0x0028, 0x0002).value_or(1);
-  header.frames = elements.decimal(0x0028, 0x0008, 1);
-  header.bits_allocated = elements.number(0x0028, 0x0100).value_or(0);
-  header.bits_stored = elements.number(0x0028, 0x0101).value_or(header.bits_allocated);
-  header.high_bit = elements.number(0x0028, 0x0102).value_or(header.bits_stored - 1);
-  header.is_signed = elements.number(0x0028, 0x0103).value_or(0) == 1;
-  header.slope = elements.decimal(0x0028, 0x1053, 1);
-  header.intercept = elements.decimal(0x0028, 0x1052, 0);
-  if (const auto number = elements.decimals(0x0020, 0x0013, 1); !number.empty() && std::abs(number[0]) < 1e15)
-    header.instance = static_cast<int64_t>(number[0]);
-  header.position = elements.decimals(0x0020, 0x0032, 3);
-  header.orientation = elements.decimals(0x0020, 0x0037, 6);
-  header.pixel_spacing = elements.decimals(0x0028, 0x0030, 2);
-  header.thickness = elements.decimal(0x0018, 0x0088, elements.decimal(0x0018, 0x0050, 1));
-  header.encapsulated = reader.GetFile().GetHeader().GetDataSetTransferSyntax().IsEncapsulated();
-  return header;
-}
 
 /// That a slice is of a kind that we read, and that its file and our memory can hold it.
-Status check_slice(const SliceHeader& h, uint64_t memory_limit) {
+Status check_slice(const DicomHeader& h, uint64_t memory_limit) {
   if (h.rows < 1 || h.columns < 1) return bad_input(h.path, "image without pixels");
   if (h.frames != 1)
     return bad_input(h.path, fmt::format("file of {} frames: expected one slice a file", h.frames));
@@ -152,22 +45,21 @@ Status check_slice(const SliceHeader& h, uint64_t memory_limit) {
         h.path, fmt::format("pixels have {} bits, {} of them used up to bit {}: expected 8 or 16, used from "
                             "the lowest up",
                             h.bits_allocated, h.bits_stored, h.high_bit));
-  std::error_code error;
-  const auto file_bytes = fs::file_size(h.path, error);
-  if (error) return bad_input(h.path, "cannot read the file: " + error.message());
+  uint64_t held = 0;
+  for (const FilePart& part : h.pixels) held += static_cast<uint64_t>(part.bytes);
   // The best codecs reduce flat pictures some thousandfold.
   const uint64_t bytes = static_cast<uint64_t>(h.slice_bytes());
-  if (bytes / (h.encapsulated ? 65536 : 1) > file_bytes)
-    return bad_input(h.path,
-                     fmt::format("header says {} x {} pixels of {} bits: a file of {} bytes cannot hold them",
-                                 h.columns, h.rows, h.bits_allocated, file_bytes));
+  if (bytes / (h.encapsulated ? 65536 : 1) > held)
+    return bad_input(
+        h.path, fmt::format("header says {} x {} pixels of {} bits: its {} bytes of pixels cannot hold them",
+                            h.columns, h.rows, h.bits_allocated, held));
   if (bytes > memory_limit / 2)
     return fail(ErrorCode::limit, h.path,
                 fmt::format("one slice takes {} bytes: more than half of --max-memory", bytes));
   return {};
 }
 
-Status check_alike(const SliceHeader& first, const SliceHeader& h) {
+Status check_alike(const DicomHeader& first, const DicomHeader& h) {
   const auto differs = [&](const char* what) {
     return bad_input(
         h.path, fmt::format("{} differs from that of {}: expected one for all slices", what, first.path));
@@ -187,9 +79,9 @@ Status check_alike(const SliceHeader& first, const SliceHeader& h) {
   return {};
 }
 
-Status check_one_series(const std::string& folder, const std::vector<SliceHeader>& slices) {
+Status check_one_series(const std::string& folder, const std::vector<DicomHeader>& slices) {
   std::map<std::string, size_t> series;
-  for (const SliceHeader& h : slices) ++series[h.series];
+  for (const DicomHeader& h : slices) ++series[h.series];
   if (series.size() == 1) return {};
   std::string list;
   for (const auto& [uid, count] : series) {
@@ -206,7 +98,7 @@ Status check_one_series(const std::string& folder, const std::vector<SliceHeader
 
 /// Puts the slices in order: by position along their normal, else by instance number, else by file name.
 /// Gives the distance of neighbours, the median where they are uneven.
-Result<double> sort_slices(std::vector<SliceHeader>& slices) {
+Result<double> sort_slices(std::vector<DicomHeader>& slices) {
   const std::vector<double> o = slices.front().orientation;
   const bool placed =
       !o.empty() && std::all_of(slices.begin(), slices.end(), [](auto& h) { return !h.position.empty(); });
@@ -216,7 +108,7 @@ Result<double> sort_slices(std::vector<SliceHeader>& slices) {
     const double length = std::sqrt(normal[0] * normal[0] + normal[1] * normal[1] + normal[2] * normal[2]);
     if (!(std::abs(length - 1) < 0.01))
       return bad_input(slices.front().path, "orientation is none: expected two unit vectors at right angles");
-    const auto along = [&](const SliceHeader& h) {
+    const auto along = [&](const DicomHeader& h) {
       return normal[0] * h.position[0] + normal[1] * h.position[1] + normal[2] * h.position[2];
     };
     std::stable_sort(slices.begin(), slices.end(), [&](auto& a, auto& b) { return along(a) < along(b); });
@@ -234,7 +126,7 @@ Result<double> sort_slices(std::vector<SliceHeader>& slices) {
     return distances[distances.size() / 2];
   }
   std::set<int64_t> instances;
-  for (const SliceHeader& h : slices)
+  for (const DicomHeader& h : slices)
     if (h.instance) instances.insert(*h.instance);
   if (instances.size() == slices.size())
     std::sort(slices.begin(), slices.end(), [](auto& a, auto& b) { return *a.instance < *b.instance; });
@@ -243,17 +135,114 @@ Result<double> sort_slices(std::vector<SliceHeader>& slices) {
   return slices.front().thickness;
 }
 
+/// Width and height that a JPEG, JPEG-LS or JPEG 2000 code stream states, where it states them.
+std::optional<std::pair<int64_t, int64_t>> coded_size(const std::vector<char>& code) {
+  const auto word = [&](size_t at) {
+    return static_cast<int64_t>(static_cast<unsigned char>(code[at])) << 8 |
+           static_cast<unsigned char>(code[at + 1]);
+  };
+  if (code.size() < 4) return std::nullopt;
+  if (word(0) == 0xff4f) {  // JPEG 2000: SIZ follows at once; image less its offset, as 32-bit numbers
+    if (code.size() < 24 || word(2) != 0xff51) return std::nullopt;
+    const auto number = [&](size_t at) { return word(at) << 16 | word(at + 2); };
+    return std::pair(number(8) - number(16), number(12) - number(20));
+  }
+  if (word(0) != 0xffd8) return std::nullopt;
+  for (size_t at = 2; at + 9 <= code.size();) {
+    const int64_t marker = word(at);
+    const bool frame =
+        (marker >= 0xffc0 && marker <= 0xffcf && marker != 0xffc4 && marker != 0xffc8 && marker != 0xffcc) ||
+        marker == 0xfff7;
+    if (frame) return std::pair(word(at + 7), word(at + 5));
+    if (marker < 0xff00 || marker == 0xffda) return std::nullopt;
+    at += marker == 0xffff ? 1 : 2 + static_cast<size_t>(word(at + 2));
+  }
+  return std::nullopt;
+}
+
+/// Decodes JPEG, JPEG-LS or JPEG 2000 into `out`, which holds a slice. The codecs are called directly and not
+/// through gdcm::ImageReader, which copies as many bytes as the code stream decodes to, however many there
+/// should be.
+Status decode_jpeg(const DicomHeader& h, const std::vector<char>& code, std::vector<std::byte>& out) {
+  const auto corrupt = [&](const char* what) {
+    return bad_input(h.path, std::string("corrupt DICOM file: ") + what);
+  };
+  const gdcm::TransferSyntax syntax(gdcm::TransferSyntax::GetTSType(h.transfer_syntax.c_str()));
+  gdcm::JPEGCodec jpeg;
+  gdcm::JPEGLSCodec jpeg_ls;
+  gdcm::JPEG2000Codec jpeg_2000;
+  gdcm::ImageCodec* codec = nullptr;
+  for (gdcm::ImageCodec* one : std::initializer_list<gdcm::ImageCodec*>{&jpeg, &jpeg_ls, &jpeg_2000})
+    if (!codec && one->CanDecode(syntax)) codec = one;
+  if (!codec) return bad_input(h.path, fmt::format("unsupported transfer syntax {}", h.transfer_syntax));
+  if (coded_size(code) != std::pair(h.columns, h.rows))
+    return corrupt("its compressed image is not of the size that its header says");
+
+  gdcm::Fragment fragment;
+  fragment.SetByteValue(code.data(), static_cast<uint32_t>(code.size()));
+  const auto fragments = gdcm::SequenceOfFragments::New();
+  fragments->AddFragment(fragment);
+  gdcm::DataElement element(gdcm::Tag(0x7fe0, 0x0010), 0, gdcm::VR::OB);
+  element.SetValue(*fragments);
+  const unsigned dims[3] = {static_cast<unsigned>(h.columns), static_cast<unsigned>(h.rows), 1};
+  codec->SetNumberOfDimensions(2);
+  codec->SetDimensions(dims);
+  codec->SetPlanarConfiguration(0);
+  codec->SetPhotometricInterpretation(gdcm::PhotometricInterpretation::MONOCHROME2);
+  codec->SetPixelFormat(gdcm::PixelFormat(1, static_cast<uint16_t>(h.bits_allocated),
+                                          static_cast<uint16_t>(h.bits_stored),
+                                          static_cast<uint16_t>(h.high_bit), h.is_signed));
+  jpeg_ls.SetBufferLength(static_cast<unsigned long>(h.slice_bytes()));
+  gdcm::DataElement decoded;
+  if (!codec->Decode(element, decoded)) return corrupt("its pixels cannot be decoded");
+  // Codecs may add a byte to make the number of bytes even.
+  const gdcm::ByteValue* bytes = decoded.GetByteValue();
+  const int64_t length = bytes ? static_cast<int64_t>(bytes->GetLength()) : 0;
+  if (codec->GetPixelFormat().GetBitsAllocated() != h.bits_allocated || length < h.slice_bytes() ||
+      length > h.slice_bytes() + 1)
+    return corrupt("its pixels are not of the number and type that its header says");
+  std::memcpy(out.data(), bytes->GetPointer(), out.size());
+  return {};
+}
+
+/// The pixels of a compressed slice.
+Result<std::vector<std::byte>> decode(const DicomHeader& h) {
+  try {
+    std::ifstream file(h.path, std::ios_base::binary);
+    std::vector<char> code;  // a slice is one frame: its fragments are one code
+    for (const FilePart& part : h.pixels) {
+      const size_t before = code.size();
+      code.resize(before + static_cast<size_t>(part.bytes));
+      file.seekg(part.offset);
+      if (!file.read(code.data() + before, part.bytes))
+        return bad_input(h.path, "cannot read the pixels: the file is shorter than when it was opened");
+    }
+    std::vector<std::byte> pixels(static_cast<size_t>(h.slice_bytes()));
+    if (h.transfer_syntax != "1.2.840.10008.1.2.5") {
+      VOX_CHECK(decode_jpeg(h, code, pixels));
+    } else if (!decode_dicom_rle(std::as_bytes(std::span(code)), h.columns * h.rows, h.bits_allocated / 8,
+                                 pixels.data())) {
+      return bad_input(h.path, "corrupt DICOM file: its run-length code ends early");
+    }
+    return pixels;
+  } catch (const std::bad_alloc&) {
+    return fail(ErrorCode::limit, h.path, "not enough memory to decode a slice");
+  } catch (const std::exception&) {
+    return bad_input(h.path, "corrupt DICOM file: its pixels cannot be decoded");
+  }
+}
+
 class DicomSeries : public SlicedSource {
  public:
   static SourceResult open(const std::string& folder, Context& ctx) {
     std::unique_ptr<DicomSeries> series(new DicomSeries);
-    std::vector<SliceHeader>& slices = series->slices_;
+    std::vector<DicomHeader>& slices = series->slices_;
     std::error_code error;
     for (fs::directory_iterator it(folder, error), end; !error && it != end; it.increment(error)) {
       VOX_CHECK(check_interrupt());
       std::error_code ignored;
-      if (!it->is_regular_file(ignored) || !has_dicom_magic(it->path().string())) continue;
-      VOX_TRY(auto header, read_header(it->path().string()));
+      if (!it->is_regular_file(ignored)) continue;
+      VOX_TRY(auto header, read_dicom_header(it->path().string()));
       if (header) slices.push_back(std::move(*header));
     }
     if (error) return bad_input(folder, "cannot read the folder: " + error.message());
@@ -261,13 +250,13 @@ class DicomSeries : public SlicedSource {
     // The order of a folder's entries is chance: messages shall not depend on it.
     std::sort(slices.begin(), slices.end(), [](auto& a, auto& b) { return natural_less(a.path, b.path); });
     VOX_CHECK(check_one_series(folder, slices));
-    for (const SliceHeader& h : slices) {
+    for (const DicomHeader& h : slices) {
       VOX_CHECK(check_slice(h, ctx.memory->limit()));
       VOX_CHECK(check_alike(slices.front(), h));
     }
     VOX_TRY(const double distance, sort_slices(slices));
 
-    const SliceHeader& first = slices.front();
+    const DicomHeader& first = slices.front();
     VolumeInfo& info = series->info_;
     info.dims = {first.columns, first.rows, static_cast<int64_t>(slices.size())};
     info.sample_type = first.bits_allocated == 8 ? (first.is_signed ? SampleType::i8 : SampleType::u8)
@@ -286,32 +275,22 @@ class DicomSeries : public SlicedSource {
 
  protected:
   Status read_rows(int64_t z, int64_t y0, int64_t y1, std::byte* rows) override {
-    const SliceHeader& h = slices_[static_cast<size_t>(z)];
-    try {
-      gdcm::ImageReader reader;
-      reader.SetFileName(h.path.c_str());
-      if (!reader.Read()) return bad_input(h.path, "corrupt DICOM file: its image cannot be read");
-      const gdcm::Image& image = reader.GetImage();
-      const gdcm::PixelFormat& pixels = image.GetPixelFormat();
-      if (image.GetColumns() != h.columns || image.GetRows() != h.rows ||
-          pixels.GetBitsAllocated() != h.bits_allocated || pixels.GetSamplesPerPixel() != 1 ||
-          image.GetBufferLength() != static_cast<uint64_t>(h.slice_bytes()))
-        return bad_input(h.path, "image is not of the size and type that its header says");
-      const bool whole = y0 == 0 && y1 == h.rows;
-      std::vector<std::byte> own(whole ? 0 : static_cast<size_t>(h.slice_bytes()));
-      std::byte* decoded = whole ? rows : own.data();
-      if (!image.GetBuffer(reinterpret_cast<char*>(decoded)))
-        return bad_input(h.path, "corrupt DICOM file: its pixels cannot be decoded");
-      const int64_t row_bytes = h.columns * (h.bits_allocated / 8);
-      if (!whole) std::memcpy(rows, decoded + y0 * row_bytes, static_cast<size_t>((y1 - y0) * row_bytes));
-      const int64_t count = (y1 - y0) * h.columns;
-      h.bits_allocated == 8 ? store<uint8_t>(h, rows, count) : store<uint16_t>(h, rows, count);
-      return {};
-    } catch (const std::bad_alloc&) {
-      return fail(ErrorCode::limit, h.path, "not enough memory to decode a slice");
-    } catch (const std::exception&) {
-      return bad_input(h.path, "corrupt DICOM file: its image cannot be read");
+    const DicomHeader& h = slices_[static_cast<size_t>(z)];
+    const int64_t row_bytes = h.columns * (h.bits_allocated / 8);
+    if (h.encapsulated) {
+      VOX_TRY(const std::vector<std::byte> pixels, decode(h));
+      std::memcpy(rows, pixels.data() + y0 * row_bytes, static_cast<size_t>((y1 - y0) * row_bytes));
+    } else {
+      std::ifstream file(h.path, std::ios_base::binary);
+      file.seekg(h.pixels.front().offset + y0 * row_bytes);
+      if (!file.read(reinterpret_cast<char*>(rows), (y1 - y0) * row_bytes))
+        return bad_input(h.path, "cannot read the pixels: the file is shorter than when it was opened");
+      if (h.big_endian && h.bits_allocated == 16)
+        for (int64_t i = 0; i < (y1 - y0) * row_bytes; i += 2) std::swap(rows[i], rows[i + 1]);
     }
+    const int64_t count = (y1 - y0) * h.columns;
+    h.bits_allocated == 8 ? store<uint8_t>(h, rows, count) : store<uint16_t>(h, rows, count);
+    return {};
   }
 
  private:
@@ -321,7 +300,7 @@ class DicomSeries : public SlicedSource {
   /// copies of the sign, or 0. Extending the sign and adding the bias 2^(n-1) are one: flip the sign bit,
   /// then add the difference.
   template <class Sample>
-  static void store(const SliceHeader& h, std::byte* rows, int64_t count) {
+  static void store(const DicomHeader& h, std::byte* rows, int64_t count) {
     const unsigned mask = (1u << h.bits_stored) - 1;
     const unsigned sign = h.is_signed ? 1u << (h.bits_stored - 1) : 0;
     const unsigned lift = h.is_signed ? (1u << (h.bits_allocated - 1)) - sign : 0;
@@ -333,7 +312,7 @@ class DicomSeries : public SlicedSource {
     }
   }
 
-  std::vector<SliceHeader> slices_;
+  std::vector<DicomHeader> slices_;
 };
 
 SourceResult open_series(const std::string& folder, const std::string&, Context& ctx) {
