@@ -30,6 +30,8 @@ class CroppedSource : public VolumeSource {
   }
   bool forward_only() const override { return source_->forward_only(); }
   std::optional<Voxel> uniform(const Box& box) const override { return source_->uniform(inner(box)); }
+  void expect(int64_t z0, int64_t z1) const override { source_->expect(z0 + box_.lo.z, z1 + box_.lo.z); }
+  void release(int64_t z0, int64_t z1) const override { source_->release(z0 + box_.lo.z, z1 + box_.lo.z); }
 
   Status read(const Box& box, VoxelSpan out) override {
     if (!slice_) return source_->read(inner(box), out);
@@ -125,6 +127,8 @@ class ConvertedSource : public VolumeSource {
     info_ = info;
   }
   bool forward_only() const override { return source_->forward_only(); }
+  void expect(int64_t z0, int64_t z1) const override { source_->expect(z0, z1); }
+  void release(int64_t z0, int64_t z1) const override { source_->release(z0, z1); }
 
   std::optional<Voxel> uniform(const Box& box) const override {
     auto value = source_->uniform(box);

@@ -190,7 +190,9 @@ Status copy_volume(VolumeSource& source, const Box& box, VolumeSink& sink, Conte
     VOX_CHECK(check_interrupt());
     const Box slab = slabs.slab(i);
     std::byte* data = buffers[overlap ? i % 2 : 0]->data();
+    source.expect(slab.lo.z, slab.hi.z);
     const Status status = read_slab(source, slab, packed(data, slab.size(), format), ctx);
+    source.release(slab.lo.z, slab.hi.z);
     if (writer.joinable()) writer.join();
     VOX_CHECK(written);
     VOX_CHECK(status);
@@ -237,6 +239,7 @@ Result<ValueRange> measure_range(VolumeSource& source, Context& ctx) {
       total.add(packed(value->bytes.data(), Index3(1), format), Index3(1), format);
       continue;
     }
+    source.expect(slab.lo.z, slab.hi.z);
     std::vector<Extremes> parts(static_cast<size_t>(Slabs::tiles(slab)));
     const Status status = parallel_for(ctx, Slabs::tiles(slab), [&](int64_t t) -> Status {
       const Box tile = Slabs::tile(slab, t);
@@ -263,6 +266,7 @@ Result<ValueRange> measure_range(VolumeSource& source, Context& ctx) {
     });
     VOX_CHECK(status);
     for (const Extremes& part : parts) total.merge(part);
+    source.release(slab.lo.z, slab.hi.z);
     ctx.progress(static_cast<double>(slab.hi.z) / static_cast<double>(box.hi.z));
   }
   if (total.lo > total.hi) return ValueRange{0, 0};

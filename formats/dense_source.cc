@@ -115,8 +115,6 @@ class MappedSource final : public VolumeSource {
   Status read(const Box& box, VoxelSpan out) override {
     if (box.empty()) return {};
     if (!info_.box().contains(box)) return fail(ErrorCode::internal, file_->name(), "box outside the volume");
-    const bool slab = box.size().x == info_.dims.x && box.size().y == info_.dims.y;
-    if (slab) advise(box, MADV_WILLNEED);
     const Runs runs(box, info_.dims, out, info_.format);
     for (int64_t run = 0; run < runs.count; ++run) {
       const int64_t y = box.lo.y + runs.y(run), z = box.lo.z + runs.z(run);
@@ -128,18 +126,18 @@ class MappedSource final : public VolumeSource {
                         runs.memory(run));
       }
     }
-    if (slab) advise(box, MADV_DONTNEED);
     return {};
   }
+  void expect(int64_t z0, int64_t z1) const override { advise(z0, z1, MADV_WILLNEED); }
+  /// Taken out of this process, not out of the page cache, so that reading again is cheap.
+  void release(int64_t z0, int64_t z1) const override { advise(z0, z1, MADV_DONTNEED); }
 
  private:
-  /// Whole slices are one stretch of the file: it is asked for before it is copied, and afterwards taken out
-  /// of this process (not out of the page cache, so that reading again is cheap), which keeps the process
-  /// small.
-  void advise(const Box& box, int advice) const {
+  /// Slices are one stretch of the file.
+  void advise(int64_t z0, int64_t z1, int advice) const {
     const uint64_t slice = static_cast<uint64_t>(info_.dims.x) * static_cast<uint64_t>(info_.dims.y);
-    const uint64_t lo = layout_.file_bytes(slice * static_cast<uint64_t>(box.lo.z)).value_or(0);
-    const uint64_t hi = layout_.file_bytes(slice * static_cast<uint64_t>(box.hi.z)).value_or(0);
+    const uint64_t lo = layout_.file_bytes(slice * static_cast<uint64_t>(z0)).value_or(0);
+    const uint64_t hi = layout_.file_bytes(slice * static_cast<uint64_t>(z1)).value_or(0);
     const uintptr_t page = static_cast<uintptr_t>(::sysconf(_SC_PAGESIZE));
     const uintptr_t first = (reinterpret_cast<uintptr_t>(samples_) + lo) / page * page;
     const uintptr_t last = (reinterpret_cast<uintptr_t>(samples_) + hi) / page * page;

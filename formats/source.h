@@ -31,6 +31,12 @@ class VolumeSource {
     return std::nullopt;
   }
 
+  /// Hints that change no result: the slices z0 .. z1 are about to be read; they will not be read again soon.
+  /// A source in a mapped file asks for its pages and gives them back, which keeps the process small whatever
+  /// the size of the file.
+  virtual void expect(int64_t z0, int64_t z1) const { (void)z0, (void)z1; }
+  virtual void release(int64_t z0, int64_t z1) const { (void)z0, (void)z1; }
+
  protected:
   VolumeInfo info_;
 };

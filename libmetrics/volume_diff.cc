@@ -329,6 +329,7 @@ Result<VolumeDiff> diff_volumes(VolumeSource& a, VolumeSource& b, std::optional<
     };
 
     if (!known(slab, total)) {
+      for (const Side& side : sides) side.source.expect(slab.lo.z, slab.hi.z);
       std::vector<Sums> parts(static_cast<size_t>(Slabs::tiles(slab)));
       const Status status = parallel_for(ctx, Slabs::tiles(slab), [&](int64_t t) -> Status {
         const Box tile = Slabs::tile(slab, t);
@@ -348,6 +349,7 @@ Result<VolumeDiff> diff_volumes(VolumeSource& a, VolumeSource& b, std::optional<
       });
       VOX_CHECK(status);
       for (const Sums& part : parts) total.merge(part);
+      for (const Side& side : sides) side.source.release(slab.lo.z, slab.hi.z);
     }
     if (errors != nullptr)
       VOX_CHECK(errors->write(slab.lo.z, slab.hi.z,

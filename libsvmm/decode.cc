@@ -37,17 +37,25 @@ Result<std::shared_ptr<const Volume>> Volume::open(std::shared_ptr<const Contain
   const auto& table = container->table();
   for (size_t i = 0; i < table.size(); ++i) {
     if (table[i].kind != blocks_kind) continue;
-    if (table[i].index >= stores.size() || table[i].part != stores[table[i].index].chunks.size())
-      return bad_input(file,
-                       fmt::format("table: chunk BLKS {}.{} is out of order", table[i].index, table[i].part));
+    if (table[i].index >= stores.size())
+      return bad_input(file, fmt::format("table: chunk BLKS {}.{}: expected a level below {}", table[i].index,
+                                         table[i].part, stores.size()));
     stores[table[i].index].chunks.push_back(i);
   }
   for (size_t k = 0; k < stores.size(); ++k) {
     const Level& level = volume->levels_[k];
     stores[k].chunk_log2 = blocks_per_chunk_log2(level.block_bytes);
     stores[k].size = level.blockwidth ? Index3(level.blockwidth) : level.dims;
+    std::vector<size_t>& chunks = stores[k].chunks;
+    std::stable_sort(chunks.begin(), chunks.end(),
+                     [&](size_t a, size_t b) { return table[a].part < table[b].part; });
     uint64_t rest = level.blocks;
-    for (size_t chunk : stores[k].chunks) {
+    for (size_t part = 0; part < chunks.size(); ++part) {
+      const size_t chunk = chunks[part];
+      if (table[chunk].part != part)
+        return bad_input(file, fmt::format("table: chunk BLKS {}.{} follows {} others of its level: expected "
+                                           "parts 0, 1, 2 ... once each",
+                                           k, table[chunk].part, part));
       const uint64_t blocks = std::min(rest, uint64_t{1} << stores[k].chunk_log2);
       uint64_t bytes = 0;
       if (blocks == 0 || __builtin_mul_overflow(blocks, level.block_bytes, &bytes) ||

@@ -220,6 +220,8 @@ class Encoder {
       if (reader && z * edge < info_.dims.z) {
         VOX_TRY(slab, reader->next(z * edge));
       }
+      const int64_t z_end = std::min((z + 1) * edge, info_.dims.z);
+      if (z * edge < z_end) source_.expect(z * edge, z_end);
       layers.reset({node_dims.x, node_dims.y, 2});
       for (int64_t begin = 0; begin < tiles; begin += batch) {
         const int64_t count = std::min(batch, tiles - begin);
@@ -234,6 +236,7 @@ class Encoder {
         ctx_.progress(static_cast<double>(z * tiles + begin + count) /
                       static_cast<double>(tiles * (node_dims.z / 2)));
       }
+      if (z * edge < z_end) source_.release(z * edge, z_end);
       VOX_CHECK(push(tile_level_ + 1, std::move(layers)));
     }
     return {};
@@ -399,8 +402,8 @@ class Encoder {
       const VoxelSpan out = packed(voxels.data(), box.size(), F);
       VOX_CHECK(check_interrupt());
       VOX_CHECK(source_.read(box, out));
-      gather_block({out.data, out.row_stride, out.slice_stride}, {dims.x, dims.y, 2}, box.size(), F,
-                   ordered.data());
+      gather_block<voxel_bytes(F)>({out.data, out.row_stride, out.slice_stride}, {dims.x, dims.y, 2},
+                                   box.size(), ordered.data());
       svmm::encode_base_block(ordered.data(), {dims.x, dims.y, 2}, F, Base::raw, params_.layout, root.bytes);
       ctx_.progress(static_cast<double>(box.hi.z) / static_cast<double>(info_.dims.z));
     }

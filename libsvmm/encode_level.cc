@@ -28,23 +28,4 @@ void relocate_links(std::byte* blocks, uint64_t count, Index3 size, VoxelFormat 
   }
 }
 
-void gather_block(ConstVoxelSpan voxels, Index3 size, Index3 valid, VoxelFormat f, std::byte* out) {
-  const size_t bytes = static_cast<size_t>(voxel_bytes(f));
-  if (valid == size) {  // pairs of voxels along x are neighbours in both orders
-    for (int64_t z = 0; z < size.z; z += 2)
-      for (int64_t y = 0; y < size.y; y += 2)
-        for (int64_t x = 0; x < size.x; x += 2)
-          for (int i = 0; i < 4; ++i, out += 2 * bytes)
-            std::memcpy(out, voxels.row(y + (i & 1), z + (i >> 1)) + static_cast<size_t>(x) * bytes,
-                        2 * bytes);
-    return;
-  }
-  std::memset(out, 0, static_cast<size_t>(size.x * size.y * size.z) * bytes);
-  for (int64_t z = 0; z < valid.z; ++z)
-    for (int64_t y = 0; y < valid.y; ++y)
-      for (int64_t x = 0; x < valid.x; ++x)
-        std::memcpy(out + static_cast<size_t>(voxel_index({x, y, z}, size)) * bytes,
-                    voxels.row(y, z) + static_cast<size_t>(x) * bytes, bytes);
-}
-
 }  // namespace voxkit::svmm

@@ -129,19 +129,23 @@ Node<F> encode_block(const NodeGrid<F>& grid, Index3 lo, Index3 level_size, int 
 
 /// Copies the voxels of a block of extent `size`, of which `valid` lie inside the volume, to block order; the
 /// rest is zero.
-void gather_block(ConstVoxelSpan voxels, Index3 size, Index3 valid, VoxelFormat f, std::byte* out);
-
-/// Whether all voxels of a box of that size are the same, byte for byte.
 template <int Bytes>
-bool all_equal(ConstVoxelSpan voxels, Index3 size) {
-  const std::byte* first = voxels.data;
-  const size_t row_bytes = static_cast<size_t>(size.x) * Bytes;
-  // The first row equals itself shifted by a voxel; every row equals the first.
-  if (std::memcmp(first, first + Bytes, row_bytes - Bytes) != 0) return false;
-  for (int64_t z = 0; z < size.z; ++z)
-    for (int64_t y = 0; y < size.y; ++y)
-      if (std::memcmp(voxels.row(y, z), first, row_bytes) != 0) return false;
-  return true;
+void gather_block(ConstVoxelSpan voxels, Index3 size, Index3 valid, std::byte* out) {
+  if (valid == size) {  // pairs of voxels along x are neighbours in both orders
+    for (int64_t z = 0; z < size.z; z += 2)
+      for (int64_t y = 0; y < size.y; y += 2) {
+        const std::byte* rows[4] = {voxels.row(y, z), voxels.row(y + 1, z), voxels.row(y, z + 1),
+                                    voxels.row(y + 1, z + 1)};
+        for (int64_t x = 0; x < size.x * Bytes; x += 2 * Bytes)
+          for (int i = 0; i < 4; ++i, out += 2 * Bytes) std::memcpy(out, rows[i] + x, 2 * Bytes);
+      }
+    return;
+  }
+  std::memset(out, 0, static_cast<size_t>(size.x * size.y * size.z) * Bytes);
+  for (int64_t z = 0; z < valid.z; ++z)
+    for (int64_t y = 0; y < valid.y; ++y)
+      for (int64_t x = 0; x < valid.x; ++x)
+        std::memcpy(out + voxel_index({x, y, z}, size) * Bytes, voxels.row(y, z) + x * Bytes, Bytes);
 }
 
 /// Encodes the block of w^3 voxels of the base level at `voxels`, of which `valid` lie inside the volume (at
@@ -150,36 +154,47 @@ template <VoxelFormat F>
 Node<F> encode_base_block(ConstVoxelSpan voxels, Index3 valid, int w, const Params& params,
                           const Criterion& criterion, std::vector<std::byte>& scratch, BlockBuffer& out) {
   constexpr int bytes = voxel_bytes(F);
-  Node<F> parent;
-  const uint64_t count = static_cast<uint64_t>(valid.x * valid.y * valid.z);
-  if (all_equal<bytes>(voxels, valid)) {
-    Voxel v;
-    std::memcpy(v.bytes.data(), voxels.data, bytes);
-    parent.moments.add_uniform(v, count, criterion);
-  } else {
+  const Index3 size(w);
+  const int64_t count = valid.x * valid.y * valid.z, all = size.x * size.y * size.z;
+  const std::byte* const block = scratch.data();
+  gather_block<bytes>(voxels, size, valid, scratch.data());
+  // Visits the voxels inside the volume, in block order, while visit returns true.
+  const auto every = [&](auto visit) {
+    if (count == all) {
+      for (int64_t i = 0; i < all; ++i)
+        if (!visit(block + i * bytes)) return false;
+      return true;
+    }
     for (int64_t z = 0; z < valid.z; ++z)
-      for (int64_t y = 0; y < valid.y; ++y) {
-        const std::byte* row = voxels.row(y, z);
-        for (int64_t x = 0; x < valid.x; ++x) parent.moments.add(row + x * bytes, criterion);
-      }
+      for (int64_t y = 0; y < valid.y; ++y)
+        for (int64_t x = 0; x < valid.x; ++x)
+          if (!visit(block + voxel_index({x, y, z}, size) * bytes)) return false;
+    return true;
+  };
+
+  Node<F> parent;
+  // All voxels are equal if each equals the next.
+  if (count == all && std::memcmp(block, block + bytes, static_cast<size_t>((all - 1) * bytes)) == 0) {
+    Voxel v;
+    std::memcpy(v.bytes.data(), block, bytes);
+    parent.moments.add_uniform(v, static_cast<uint64_t>(count), criterion);
+  } else if (count == all) {
+    parent.moments.add(block, all, criterion);
+  } else {
+    every([&](const std::byte* v) {
+      parent.moments.add(v, 1, criterion);
+      return true;
+    });
   }
   parent.value = parent.moments.value(criterion);
   bool homogeneous = parent.moments.within(parent.value, criterion);
-  if (!homogeneous && is_colour(F)) {  // the box of values is too wide, but perhaps no voxel is in its corner
-    homogeneous = true;
-    for (int64_t z = 0; z < valid.z && homogeneous; ++z)
-      for (int64_t y = 0; y < valid.y && homogeneous; ++y) {
-        const std::byte* row = voxels.row(y, z);
-        for (int64_t x = 0; x < valid.x && homogeneous; ++x)
-          homogeneous = Moments<F>::near(row + x * bytes, parent.value, criterion);
-      }
-  }
+  if (!homogeneous && is_colour(F))  // the box of values is too wide, but perhaps no voxel is in its corner
+    homogeneous = every([&](const std::byte* v) { return Moments<F>::near(v, parent.value, criterion); });
   if (homogeneous) return parent;
   parent.terminal = false;
   parent.block = out.blocks++;
-  out.terminal_voxels += count;
-  gather_block(voxels, Index3(w), valid, F, scratch.data());
-  encode_base_block(scratch.data(), Index3(w), F, params.base, params.layout, out.bytes);
+  out.terminal_voxels += static_cast<uint64_t>(count);
+  encode_base_block(block, size, F, params.base, params.layout, out.bytes);
   return parent;
 }
 

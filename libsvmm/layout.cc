@@ -68,7 +68,7 @@ uint64_t structural_block_bytes(uint64_t voxels, VoxelFormat f, Layout layout) {
 
 int blocks_per_chunk_log2(uint64_t block_bytes) {
   int log2 = 0;
-  while (block_bytes << (log2 + 1) <= uint64_t{1} << 20) ++log2;
+  while (block_bytes <= (uint64_t{1} << 20) >> (log2 + 1)) ++log2;
   return log2;
 }
 
@@ -88,8 +88,10 @@ std::vector<Level> plan_levels(const VolumeInfo& info, const Params& params) {
   }
   const uint64_t voxels =
       static_cast<uint64_t>(dims.x) * static_cast<uint64_t>(dims.y) * static_cast<uint64_t>(dims.z);
-  const uint64_t bytes = levels.empty() ? base_block_bytes(voxels, 0, info.format, Base::raw, params.layout)
-                                        : structural_block_bytes(voxels, info.format, params.layout);
+  uint64_t bytes = ~uint64_t{0};  // what a root past 2^60 voxels may take: no file holds it, no memory either
+  if (voxels <= uint64_t{1} << 60)
+    bytes = levels.empty() ? base_block_bytes(voxels, 0, info.format, Base::raw, params.layout)
+                           : structural_block_bytes(voxels, info.format, params.layout);
   levels.push_back({0, mip_factor, dims, 1, bytes, 0});
   return levels;
 }
@@ -146,6 +148,8 @@ Result<ParamsAndLevels> unpack_params(std::span<const std::byte> bytes, const Vo
   if (count < 1 || count > max_levels || bytes.size() != params_bytes + count * level_bytes)
     return bad(4, fmt::format("{} levels in a chunk of {} bytes: expected 64 bytes and 64 a level", count,
                               bytes.size()));
+  if (count == 1 && params.base != Base::raw)
+    return bad(1, fmt::format("base {} in a volume of one level: expected 1 (raw)", field(1)));
   params.rootwidth =
       static_cast<int64_t>(std::min<uint64_t>(load_le<uint64_t>(&bytes[8]), uint64_t{1} << 62));
   params.quality = load_le<double>(&bytes[16]);

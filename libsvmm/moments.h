@@ -54,14 +54,13 @@ requires(is_colour(F)) struct Moments<F> {
     std::fill(lo, lo + channels, uint8_t{255});
     std::fill(hi, hi + channels, uint8_t{0});
   }
-  void add(const std::byte* v, const Criterion& criterion) {
-    uint8_t c[4] = {};
-    std::memcpy(c, v, channels);
-    const uint32_t weight = criterion.alpha_weight ? c[3] : 1u;
-    ++count;
-    for (int k = 0; k < 3; ++k) sum[k] += c[k] * weight;
-    if constexpr (channels == 4) alpha += c[3];
-    for (int k = 0; k < channels; ++k) lo[k] = std::min(lo[k], c[k]), hi[k] = std::max(hi[k], c[k]);
+  /// `n` voxels, one after another.
+  void add(const std::byte* v, int64_t n, const Criterion& criterion) {
+    count += static_cast<uint64_t>(n);
+    if (criterion.alpha_weight)
+      add_components<true>(v, n);
+    else
+      add_components<false>(v, n);
   }
   void add(const Moments& m) {
     count += m.count;
@@ -71,7 +70,7 @@ requires(is_colour(F)) struct Moments<F> {
   }
   void add_uniform(const Voxel& v, uint64_t n, const Criterion& criterion) {
     Moments one;
-    one.add(v.bytes.data(), criterion);
+    one.add(v.bytes.data(), 1, criterion);
     for (int k = 0; k < 3; ++k) one.sum[k] *= n;
     one.alpha *= n;
     one.count = n;
@@ -114,6 +113,24 @@ requires(is_colour(F)) struct Moments<F> {
     }
     return squared <= criterion.squared;
   }
+
+ private:
+  template <bool Weighted>
+  void add_components(const std::byte* v, int64_t n) {
+    for (int64_t end = 0; n > 0; n -= end, v += end * channels) {
+      end = std::min<int64_t>(n, 1 << 15);  // as many as 32 bits can sum up
+      uint32_t part[4] = {};
+      for (int64_t i = 0; i < end; ++i) {
+        uint8_t c[4] = {};
+        std::memcpy(c, v + i * channels, channels);
+        for (int k = 0; k < 3; ++k) part[k] += Weighted ? uint32_t{c[k]} * c[3] : c[k];
+        part[3] += c[3];
+        for (int k = 0; k < channels; ++k) lo[k] = std::min(lo[k], c[k]), hi[k] = std::max(hi[k], c[k]);
+      }
+      for (int k = 0; k < 3; ++k) sum[k] += part[k];
+      alpha += part[3];
+    }
+  }
 };
 
 /// DENSITY8, DENSITY16 and BITMAP. A BITMAP average is its coverage, 0..255.
@@ -125,12 +142,22 @@ requires(F == VoxelFormat::density8 || F == VoxelFormat::density16 ||
   Value lo = static_cast<Value>(-1), hi = 0;
 
   static Value load(const std::byte* v) { return load_le<Value>(v); }
-  void add(const std::byte* v, const Criterion&) {
-    const Value x = load(v);
-    ++count;
-    sum += x;
-    lo = std::min(lo, x);
-    hi = std::max(hi, x);
+  void add(const std::byte* v, int64_t n, const Criterion&) {
+    count += static_cast<uint64_t>(n);
+    for (int64_t end = 0; n > 0; n -= end, v += end * static_cast<int64_t>(sizeof(Value))) {
+      end = std::min<int64_t>(n, 1 << 15);  // as many as 32 bits can sum up
+      uint32_t part = 0;
+      Value least = lo, greatest = hi;
+      for (int64_t i = 0; i < end; ++i) {
+        const Value x = load(v + i * static_cast<int64_t>(sizeof(Value)));
+        part += x;
+        least = std::min(least, x);
+        greatest = std::max(greatest, x);
+      }
+      sum += part;
+      lo = least;
+      hi = greatest;
+    }
   }
   void add(const Moments& m) {
     count += m.count;
@@ -170,12 +197,14 @@ struct Moments<VoxelFormat::float32> {
     return bits & 0x80000000u ? ~bits : bits | 0x80000000u;
   }
   static float from_key(uint32_t k) { return std::bit_cast<float>(k & 0x80000000u ? k & 0x7fffffffu : ~k); }
-  void add(const std::byte* v, const Criterion&) {
-    const float x = load_le<float>(v);
-    ++count;
-    if (std::isfinite(x)) ++finite, sum += static_cast<double>(x);
-    lo = std::min(lo, key(x));
-    hi = std::max(hi, key(x));
+  void add(const std::byte* v, int64_t n, const Criterion&) {
+    count += static_cast<uint64_t>(n);
+    for (int64_t i = 0; i < n; ++i) {
+      const float x = load_le<float>(v + i * 4);
+      if (std::isfinite(x)) ++finite, sum += static_cast<double>(x);
+      lo = std::min(lo, key(x));
+      hi = std::max(hi, key(x));
+    }
   }
   void add(const Moments& m) {
     count += m.count;
