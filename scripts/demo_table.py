@@ -1,0 +1,26 @@
+#!/usr/bin/env python3
+"""Prints the results of scripts/demo as one table: demo_table.py RESULT... reads RESULT.{encode,decode,diff}.json."""
+import json
+import sys
+
+COLUMNS = ("input", "quality", "bytes", "percent", "bits/voxel", "PSNR dB", "greatest error", "encode MB/s",
+           "decode Mvoxel/s")
+
+
+def load(result, step):
+    with open(f"{result}.{step}.json", encoding="utf-8") as file:
+        return json.load(file)
+
+
+def row(result):
+    encode, decode, diff = (load(result, step) for step in ("encode", "decode", "diff"))
+    x, y, z = encode["dims"]
+    return (encode["input"], f"{encode['params']['quality']:g}", f"{encode['file_bytes']}", f"{encode['percent']:.1f}",
+            f"{encode['bits_per_voxel']:.2f}", f"{float(diff['psnr_db']):.2f}", f"{diff['max_abs_error']:g}",
+            f"{encode['input_mb_per_s']:.0f}", f"{x * y * z / 1e6 / decode['decode_seconds']:.0f}")
+
+
+rows = [COLUMNS] + [row(result) for result in sys.argv[1:]]
+widths = [max(len(cells[i]) for cells in rows) for i in range(len(COLUMNS))]
+for cells in rows:
+    print(cells[0].ljust(widths[0]), *(cell.rjust(width) for cell, width in zip(cells[1:], widths[1:])), sep="  ")
