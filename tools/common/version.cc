@@ -6,7 +6,9 @@
 namespace voxkit::cli {
 namespace {
 
-#if defined(__AVX512F__)
+#if defined(VOXKIT_SCALAR)
+constexpr const char* simd_target = "scalar";
+#elif defined(__AVX512F__)
 constexpr const char* simd_target = "avx512";
 #elif defined(__AVX2__)
 constexpr const char* simd_target = "avx2";
