@@ -104,7 +104,7 @@ Box Slabs::tile(const Box& slab, int64_t index) {
 }
 
 uint64_t slab_target(const Context& ctx) {
-  return std::min<uint64_t>(uint64_t{32} << 20, ctx.memory->limit() / 8);
+  return std::min<uint64_t>(uint64_t{8} << 20, ctx.memory->limit() / 8);
 }
 
 Result<std::unique_ptr<Buffer>> Buffer::allocate(uint64_t bytes, const std::string& what, Context& ctx) {
@@ -213,7 +213,6 @@ Status copy_volume(VolumeSource& source, const Box& box, VolumeSink& sink, Conte
   if (writer.joinable()) writer.join();
   VOX_CHECK(written);
   VOX_CHECK(check_interrupt());
-  VOX_CHECK(sink.finish());
   ctx.progress(1);
   return {};
 }

@@ -66,8 +66,8 @@ Status walk_tile(const Box& tile, const std::function<bool(const Box&)>& known,
 /// boxes are filled without being read.
 Status read_slab(VolumeSource& source, const Box& slab, VoxelSpan out, Context& ctx);
 
-/// Copies `box` of a source to a sink whose volume has the size of the box, and finishes the sink. One slab
-/// is written while the next is read. `box` must have the source's width and height where that is
+/// Copies `box` of a source to a sink whose volume has the size of the box; the caller finishes the sink. One
+/// slab is written while the next is read. `box` must have the source's width and height where that is
 /// forward-only.
 Status copy_volume(VolumeSource& source, const Box& box, VolumeSink& sink, Context& ctx);
 

@@ -84,6 +84,7 @@ Result<int> work(Options& o, Run& run) {
   VOX_TRY(auto sink, create_volume(o.output, info, run.options.force, run.ctx));
   run.stage("convert");
   VOX_CHECK(copy_volume(*source, info.box(), *sink, run.ctx));
+  VOX_CHECK(sink->finish());
 
   run.note(fmt::format("{}: {} x {} x {} voxels of {} in {:.2f} s", o.output, info.dims.x, info.dims.y,
                        info.dims.z, name(info.format), run.seconds()));

@@ -92,7 +92,7 @@ TEST(CopyVolume, EveryFormatThreadsAndKind) {
           const Status status =
               copy_volume(forward ? static_cast<VolumeSource&>(front) : any, info.box(), sink, ctx);
           ASSERT_TRUE(status) << status.error().what;
-          ASSERT_TRUE(sink.finished);
+          ASSERT_TRUE(sink.finish());
           ASSERT_EQ(sink.voxels, voxels);
           ASSERT_EQ(done, 1);
           // Nothing stays reserved.
