@@ -135,29 +135,36 @@ Result<double> sort_slices(std::vector<DicomHeader>& slices) {
   return slices.front().thickness;
 }
 
-/// Width and height that a JPEG, JPEG-LS or JPEG 2000 code stream states, where it states them.
-std::optional<std::pair<int64_t, int64_t>> coded_size(const std::vector<char>& code) {
-  const auto word = [&](size_t at) {
-    return static_cast<int64_t>(static_cast<unsigned char>(code[at])) << 8 |
-           static_cast<unsigned char>(code[at + 1]);
-  };
-  if (code.size() < 4) return std::nullopt;
+/// Whether a JPEG, JPEG-LS or JPEG 2000 code stream starts with a header that is whole and states the size
+/// and depth of the slice. GDCM's codecs make room for what the code states, and some end the process over a
+/// header that is none.
+bool has_sound_header(const std::vector<char>& code, const DicomHeader& h) {
+  const auto byte = [&](size_t at) { return static_cast<int64_t>(static_cast<unsigned char>(code[at])); };
+  const auto word = [&](size_t at) { return byte(at) << 8 | byte(at + 1); };
+  if (code.size() < 64) return false;
   if (word(0) == 0xff4f) {  // JPEG 2000: SIZ follows at once; image less its offset, as 32-bit numbers
-    if (code.size() < 24 || word(2) != 0xff51) return std::nullopt;
     const auto number = [&](size_t at) { return word(at) << 16 | word(at + 2); };
-    return std::pair(number(8) - number(16), number(12) - number(20));
+    return word(2) == 0xff51 && number(8) - number(16) == h.columns && number(12) - number(20) == h.rows &&
+           word(40) == 1 && (byte(42) & 0x7f) < h.bits_allocated;
   }
-  if (word(0) != 0xffd8) return std::nullopt;
-  for (size_t at = 2; at + 9 <= code.size();) {
-    const int64_t marker = word(at);
-    const bool frame =
-        (marker >= 0xffc0 && marker <= 0xffcf && marker != 0xffc4 && marker != 0xffc8 && marker != 0xffcc) ||
-        marker == 0xfff7;
-    if (frame) return std::pair(word(at + 7), word(at + 5));
-    if (marker < 0xff00 || marker == 0xffda) return std::nullopt;
-    at += marker == 0xffff ? 1 : 2 + static_cast<size_t>(word(at + 2));
+  bool frame = false, tables = false;
+  if (word(0) != 0xffd8) return false;
+  for (size_t at = 2; at + 10 <= code.size();) {
+    const int64_t marker = word(at), length = word(at + 2);
+    if (marker < 0xffc0 || marker == 0xffff || length < 2) return false;
+    if (marker == 0xffda) return frame && tables;
+    if (marker == 0xffc0 || marker == 0xffc1 || marker == 0xffc3 || marker == 0xfff7) {
+      if (frame || byte(at + 4) < 2 || byte(at + 4) > h.bits_allocated || word(at + 5) != h.rows ||
+          word(at + 7) != h.columns || byte(at + 9) != 1)
+        return false;
+      frame = true;
+    } else if (marker < 0xffd0 && marker != 0xffc4) {
+      return false;  // other kinds of frame, and arithmetic coding
+    }
+    tables = tables || marker == 0xffc4 || marker == 0xfff7;  // JPEG-LS has no tables
+    at += 2 + static_cast<size_t>(length);
   }
-  return std::nullopt;
+  return false;
 }
 
 /// Decodes JPEG, JPEG-LS or JPEG 2000 into `out`, which holds a slice. The codecs are called directly and not
@@ -175,8 +182,8 @@ Status decode_jpeg(const DicomHeader& h, const std::vector<char>& code, std::vec
   for (gdcm::ImageCodec* one : std::initializer_list<gdcm::ImageCodec*>{&jpeg, &jpeg_ls, &jpeg_2000})
     if (!codec && one->CanDecode(syntax)) codec = one;
   if (!codec) return bad_input(h.path, fmt::format("unsupported transfer syntax {}", h.transfer_syntax));
-  if (coded_size(code) != std::pair(h.columns, h.rows))
-    return corrupt("its compressed image is not of the size that its header says");
+  if (!has_sound_header(code, h))
+    return corrupt("its compressed image is not of the size and type that its header says");
 
   gdcm::Fragment fragment;
   fragment.SetByteValue(code.data(), static_cast<uint32_t>(code.size()));
