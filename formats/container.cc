@@ -173,6 +173,8 @@ Result<std::span<const std::byte>> Container::only_chunk(uint32_t kind) const {
   const auto found = std::find_if(table_.begin(), table_.end(), is_kind);
   if (found == table_.end() || std::find_if(found + 1, table_.end(), is_kind) != table_.end())
     return bad_input(name_, fmt::format("table: expected one chunk {}", letters(kind)));
+  if (found->index != 0 || found->part != 0)
+    return bad_input(name_, fmt::format("table: {}: expected index 0 and part 0", describe(*found)));
   return chunk(static_cast<size_t>(found - table_.begin()));
 }
 
