@@ -15,7 +15,9 @@
 #include <mutex>
 #include <vector>
 
+#include "formats/mapped_file.h"
 #include "formats/module.h"
+#include "formats/openvdb_tree.h"
 
 namespace voxkit {
 namespace {
@@ -49,6 +51,7 @@ void register_types() {
     openvdb::FloatGrid::registerGrid();
     openvdb::Vec3SGrid::registerGrid();
     openvdb::Vec3IMetadata::registerType();
+    openvdb::BoolMetadata::registerType();  // whether values are stored as halves
   });
 }
 
@@ -59,7 +62,6 @@ void register_types() {
 struct GridEntry {
   std::string name, type, parent;
   int64_t descriptor = 0, start = 0, end = 0;  ///< byte offsets
-  int64_t memory = 0;                          ///< what its writer measured; 0 where not stated
   bool is(const char* tree) const { return type == tree || type == std::string(tree) + "_HalfFloat"; }
   bool is_float() const { return is("Tree_float_5_4_3"); }
   bool is_vec3s() const { return is("Tree_vec3s_5_4_3"); }
@@ -81,7 +83,7 @@ class Walker {
     skip(8);  // library version
     const bool offsets = number<char>() != 0;
     skip(36);  // UUID
-    metadata(nullptr);
+    metadata();
     const int32_t count = number<int32_t>();
     std::vector<GridEntry> entries;
     for (int32_t i = 0; i < count; ++i) {
@@ -102,7 +104,7 @@ class Walker {
                               entry.name, entry.start, entry.end, here, size_));
       stream_.seekg(entry.start);
       skip(4);  // compression
-      metadata(&entry.memory);
+      metadata();
       text();  // type of the transform
       stream_.seekg(entry.end);
       entries.push_back(std::move(entry));
@@ -129,15 +131,12 @@ class Walker {
     if (length) stream_.read(value.data(), length);
     return value;
   }
-  /// Names, types and values, of which only the grid's size in memory is of use.
-  void metadata(int64_t* memory) {
+  /// Names, types and values.
+  void metadata() {
     for (uint32_t count = number<uint32_t>(); count > 0; --count) {
-      const std::string key = text(), type = text();
-      const uint32_t length = number<uint32_t>();
-      if (memory && key == "file_mem_bytes" && type == "int64" && length == 8)
-        *memory = number<int64_t>();
-      else
-        skip(length);
+      text();
+      text();
+      skip(number<uint32_t>());
     }
   }
 
@@ -149,20 +148,28 @@ class Walker {
 /// disk a cut file.
 class Archive : public openvdb::io::Archive {
  public:
-  openvdb::GridBase::Ptr read(std::istream& stream, const GridEntry& entry) {
+  /// The grid without its tree, at which the stream stands then.
+  openvdb::GridBase::Ptr read_head(std::istream& stream, const GridEntry& entry) {
     stream.seekg(0);
     readHeader(stream);
-    openvdb::io::StreamMetadata::Ptr state(new openvdb::io::StreamMetadata);
-    openvdb::io::setStreamMetadataPtr(stream, state, /*transfer=*/false);
+    openvdb::io::setStreamMetadataPtr(stream, state_, /*transfer=*/false);
     openvdb::io::setVersion(stream, libraryVersion(), fileVersion());
     openvdb::io::setDataCompression(stream, compression());
     stream.seekg(entry.descriptor);
     openvdb::io::GridDescriptor descriptor;
     openvdb::GridBase::Ptr grid = descriptor.read(stream);
     stream.seekg(entry.start);
-    readGrid(grid, descriptor, stream);
-    openvdb::io::clearStreamMetadataPtr(stream);
+    readGridCompression(stream);
+    grid->readMeta(stream);
+    openvdb::io::setGridClass(stream, grid->getGridClass());
+    grid->readTransform(stream);
     return grid;
+  }
+  /// The tree, which check_vdb_tree has passed: OpenVDB itself checks nothing.
+  void read_tree(std::istream& stream, openvdb::GridBase& grid) {
+    grid.readTopology(stream);
+    grid.readBuffers(stream);
+    openvdb::io::clearStreamMetadataPtr(stream);
   }
   void write_to(std::ostream& stream, const openvdb::GridBase::Ptr& grid) {
     setCompression(openvdb::io::COMPRESS_ACTIVE_MASK |
@@ -177,6 +184,7 @@ class Archive : public openvdb::io::Archive {
 
  private:
   using openvdb::io::Archive::write;
+  openvdb::io::StreamMetadata::Ptr state_{new openvdb::io::StreamMetadata};  ///< the stream only points to it
 };
 
 // -----------------------------------------------------------------------------------------------------
@@ -370,28 +378,43 @@ Result<GridEntry> choose(const std::string& path, const std::vector<GridEntry>& 
   return bad_input(path, fmt::format("no grid is named {}: there are {}", name, list));
 }
 
+/// Bytes of the tree in memory, within a percent or two.
+template <class Tree>
+uint64_t memory_of(const VdbTree& tree) {
+  using Upper = typename Tree::RootNodeType::ChildNodeType;
+  using Leaf = typename Tree::LeafNodeType;
+  return tree.upper * sizeof(Upper) + tree.lower * sizeof(typename Upper::ChildNodeType) +
+         tree.leaves * (sizeof(Leaf) + Leaf::SIZE * sizeof(typename Tree::ValueType));
+}
+
 SourceResult open_grid(const std::string& path, const std::string& name, Context& ctx) {
   std::ifstream stream(path, std::ios_base::binary | std::ios_base::ate);
   if (!stream) return bad_input(path, "cannot open the file");
   const int64_t size = stream.tellg();
   if (size < 0) return bad_input(path, "cannot read the file");
-  uint64_t estimate = 0;
   try {
     register_types();
     stream.exceptions(std::ios_base::failbit | std::ios_base::badbit | std::ios_base::eofbit);
     VOX_TRY(const auto entries, Walker(stream, size).grids(path));
     VOX_TRY(const GridEntry entry, choose(path, entries, name));
-    // A sparse grid in memory is up to some 40 times its compressed bytes; the writer's own figure is taken
-    // where it is sane.
-    const int64_t stored = entry.end - entry.start;
-    estimate = static_cast<uint64_t>(
-        stored + (entry.memory > 0 && entry.memory / 64 < stored ? entry.memory : 4 * stored));
-    VOX_CHECK(ctx.memory->reserve(estimate, "loading the OpenVDB grid"));
-    const auto release = [&](MemoryBudget* memory) { memory->release(estimate); };
-    const std::unique_ptr<MemoryBudget, decltype(release)> loading(ctx.memory, release);
-    const openvdb::GridBase::Ptr grid = Archive().read(stream, entry);
-    if (const auto end = int64_t{stream.tellg()}; end != entry.end && entry.end != size)
+    Archive archive;
+    const openvdb::GridBase::Ptr grid = archive.read_head(stream, entry);
+    const int value_bytes = entry.is_float() ? 4 : 12;
+    const VdbCoding coding{openvdb::io::getDataCompression(stream), value_bytes,
+                           grid->saveFloatAsHalf() ? value_bytes / 2 : value_bytes};
+    VOX_TRY(const auto file, MappedFile::open(path));
+    VOX_TRY(const VdbTree tree,
+            check_vdb_tree(file->bytes(), path, static_cast<uint64_t>(stream.tellg()), coding));
+    if (const auto end = static_cast<int64_t>(tree.end); end != entry.end && entry.end != size)
       return bad_input(path, fmt::format("grid {} ends at byte {}: expected {}", entry.name, end, entry.end));
+    {
+      const uint64_t bytes =
+          entry.is_float() ? memory_of<openvdb::FloatTree>(tree) : memory_of<openvdb::Vec3STree>(tree);
+      VOX_CHECK(ctx.memory->reserve(bytes, "loading the OpenVDB grid"));
+      const auto release = [&](MemoryBudget* memory) { memory->release(bytes); };
+      const std::unique_ptr<MemoryBudget, decltype(release)> loading(ctx.memory, release);
+      archive.read_tree(stream, *grid);
+    }
     if (const auto floats = openvdb::gridPtrCast<openvdb::FloatGrid>(grid))
       return VdbSource<Density>::create(path, floats, ctx);
     return VdbSource<Colour>::create(path, openvdb::gridPtrCast<openvdb::Vec3SGrid>(grid), ctx);
