@@ -310,7 +310,7 @@ class Encoder {
 
   /// Visits the blocks of a grid in stored order: groups of 2^3 in raster order, i = 4z + 2y + x within.
   template <class Visit>
-  static void for_each_block(Index3 size, Visit visit) {
+  static void for_each_block(const Index3& size, Visit visit) {
     for (int64_t z = 0; z < size.z; z += 2)
       for (int64_t y = 0; y < size.y; y += 2)
         for (int64_t x = 0; x < size.x; x += 2)

@@ -91,8 +91,8 @@ void relocate_links(std::byte* blocks, uint64_t count, Index3 size, VoxelFormat 
 /// it, but outside the volume, for void voxels that must be near enough as well (the published sizes say so);
 /// their weight in averages is zero all the same.
 template <VoxelFormat F>
-Node<F> encode_block(const NodeGrid<F>& grid, Index3 lo, Index3 level_size, int w, const Criterion& criterion,
-                     BlockBuffer& out) {
+Node<F> encode_block(const NodeGrid<F>& grid, const Index3& lo, const Index3& level_size, int w,
+                     const Criterion& criterion, BlockBuffer& out) {
   Node<F> parent;
   bool all_terminal = true, padding = false;
   const Index3 hi{std::min(lo.x + w, level_size.x), std::min(lo.y + w, level_size.y),
@@ -130,7 +130,7 @@ Node<F> encode_block(const NodeGrid<F>& grid, Index3 lo, Index3 level_size, int 
 /// Copies the voxels of a block of extent `size`, of which `valid` lie inside the volume, to block order; the
 /// rest is zero.
 template <int Bytes>
-void gather_block(ConstVoxelSpan voxels, Index3 size, Index3 valid, std::byte* out) {
+void gather_block(const ConstVoxelSpan& voxels, const Index3& size, const Index3& valid, std::byte* out) {
   if (valid == size) {  // pairs of voxels along x are neighbours in both orders
     for (int64_t z = 0; z < size.z; z += 2)
       for (int64_t y = 0; y < size.y; y += 2) {
@@ -148,10 +148,20 @@ void gather_block(ConstVoxelSpan voxels, Index3 size, Index3 valid, std::byte* o
         std::memcpy(out + voxel_index({x, y, z}, size) * Bytes, voxels.row(y, z) + x * Bytes, Bytes);
 }
 
+/// Whether `n` voxels (an even number) are the same, byte for byte. Pairs are compared, as `gather_block`
+/// wrote them: a wider load would have to wait for both stores.
+template <int Bytes>
+bool all_equal(const std::byte* voxels, int64_t n) {
+  if (std::memcmp(voxels, voxels + Bytes, Bytes) != 0) return false;
+  for (int64_t i = 2; i < n; i += 2)
+    if (std::memcmp(voxels, voxels + i * Bytes, 2 * Bytes) != 0) return false;
+  return true;
+}
+
 /// Encodes the block of w^3 voxels of the base level at `voxels`, of which `valid` lie inside the volume (at
 /// least one), and returns its equivalent voxel. `scratch` holds w^3 voxels.
 template <VoxelFormat F>
-Node<F> encode_base_block(ConstVoxelSpan voxels, Index3 valid, int w, const Params& params,
+Node<F> encode_base_block(const ConstVoxelSpan& voxels, const Index3& valid, int w, const Params& params,
                           const Criterion& criterion, std::vector<std::byte>& scratch, BlockBuffer& out) {
   constexpr int bytes = voxel_bytes(F);
   const Index3 size(w);
@@ -173,8 +183,7 @@ Node<F> encode_base_block(ConstVoxelSpan voxels, Index3 valid, int w, const Para
   };
 
   Node<F> parent;
-  // All voxels are equal if each equals the next.
-  if (count == all && std::memcmp(block, block + bytes, static_cast<size_t>((all - 1) * bytes)) == 0) {
+  if (count == all && all_equal<bytes>(block, all)) {
     Voxel v;
     std::memcpy(v.bytes.data(), block, bytes);
     parent.moments.add_uniform(v, static_cast<uint64_t>(count), criterion);
