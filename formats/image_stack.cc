@@ -17,6 +17,7 @@
 #include <system_error>
 
 #include "formats/dense_source.h"
+#include "formats/image_check.h"
 #include "formats/module.h"
 #include "formats/natural_order.h"
 #include "formats/parallel.h"
@@ -238,6 +239,8 @@ Result<std::unique_ptr<ImageInput>> open_image(const std::string& path, uint64_t
   if (stat(path.c_str(), &state) != 0)
     return bad_input(path, fmt::format("cannot open: {}", std::generic_category().message(errno)));
   if (!S_ISREG(state.st_mode)) return bad_input(path, "not a regular file");
+  if (std::string_view(format) == "png") VOX_CHECK(check_png(path));
+  if (std::string_view(format) == "openexr") VOX_CHECK(check_exr(path));
   auto input = ImageInput::create(format);
   if (!input) return bad_input(path, fmt::format("OpenImageIO was built without {}", format));
   input->threads(1);  // callers decode slices side by side
