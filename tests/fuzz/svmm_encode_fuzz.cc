@@ -74,9 +74,9 @@ extern "C" int LLVMFuzzerTestOneInput(const uint8_t* data, size_t size) {
       voxels[i * stride + b] = static_cast<std::byte>(f == VoxelFormat::bitmap ? byte & 1 : byte);
     }
 
-  test::MemorySource source(info, voxels);
+  voxkit::test::MemorySource source(info, voxels);
   const auto file = encoded(source, params, 1);
-  test::ForwardSource forward(info, voxels);
+  voxkit::test::ForwardSource forward(info, voxels);
   if (encoded(forward, params, 1 + data[14] % 3) != file)
     stop("the bytes depend on the kind of source or the threads");
 
