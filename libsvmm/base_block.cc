@@ -76,7 +76,9 @@ std::array<int, 3> expand_565(unsigned c) {
 }
 
 Palette bc1_palette(unsigned c0, unsigned c1) {
-  Palette p{expand_565(c0), expand_565(c1), {}, {}};
+  Palette p{};
+  p[0] = expand_565(c0);
+  p[1] = expand_565(c1);
   for (size_t k = 0; k < 3; ++k) {
     p[2][k] = c0 > c1 ? (2 * p[0][k] + p[1][k]) / 3 : (p[0][k] + p[1][k]) / 2;
     p[3][k] = c0 > c1 ? (p[0][k] + 2 * p[1][k]) / 3 : 0;
@@ -268,6 +270,45 @@ void decode_base_block(const std::byte* block, Index3 size, VoxelFormat f, Base 
       block += base == Base::alpha ? 8 : 1;
     }
   }
+}
+
+Voxel decode_base_voxel(const std::byte* block, Index3 size, Index3 v, VoxelFormat f, Base base,
+                        Layout layout, const Voxel& parent) {
+  const int64_t index = voxel_index(v, size), subblock = index / 8;
+  const int i = static_cast<int>(index % 8);
+  Voxel voxel;
+  const auto colour = [&](int r, int g, int b, int alpha) {
+    voxel.bytes = {static_cast<std::byte>(r), static_cast<std::byte>(g), static_cast<std::byte>(b),
+                   std::byte{0}};
+    if (f == VoxelFormat::rgba32) voxel.bytes[3] = static_cast<std::byte>(alpha);
+  };
+  if (f == VoxelFormat::bitmap) {
+    voxel.bytes[0] = block[subblock] >> i & std::byte{1};
+  } else if (base == Base::raw && layout == Layout::plain) {
+    std::memcpy(voxel.bytes.data(), block + index * voxel_bytes(f), static_cast<size_t>(voxel_bytes(f)));
+  } else if (base == Base::raw) {
+    voxel = thesis_value(load_word(block + index * word_bytes(f), f), f);
+  } else if (base == Base::gray) {
+    const int l = u8(block[index]);
+    if (l != 0) colour(l, l, l, 255);
+  } else if (base == Base::bc1) {
+    const int64_t tile = (v.z * (size.y / 4) + v.y / 4) * (size.x / 4) + v.x / 4;
+    const std::byte* p = block + tile * 8;
+    const unsigned c0 = load_le<uint16_t>(p), c1 = load_le<uint16_t>(p + 2);
+    const uint32_t pixel = load_le<uint32_t>(p + 4) >> (2 * (v.y % 4 * 4 + v.x % 4)) & 3;
+    const Palette palette = bc1_palette(c0, c1);
+    const auto& c = palette[pixel];
+    if (c0 > c1 || pixel != 3) colour(c[0], c[1], c[2], 255);
+  } else {
+    const int shared = colour_from_parent(size) ? 0 : shared_bytes(f);
+    const std::byte* here = block + subblock * (shared + (base == Base::alpha ? 8 : 1));
+    const int alpha = base == Base::alpha ? u8(here[shared + i]) : (u8(here[shared]) >> i & 1) * 255;
+    if (alpha == 0) return voxel;
+    std::memcpy(voxel.bytes.data(), shared ? here : parent.bytes.data(),
+                static_cast<size_t>(shared_bytes(f)));
+    if (f == VoxelFormat::rgba32) voxel.bytes[3] = static_cast<std::byte>(alpha);
+  }
+  return voxel;
 }
 
 }  // namespace voxkit::svmm

@@ -227,11 +227,8 @@ Result<Voxel> Volume::sample(Index3 voxel, int level) const {
     return fail(ErrorCode::internal, container_->name(), "sample outside the volume");
   VOX_TRY(const auto found, decoder.descend(voxel));
   if (!found.base_block) return decoded_value(found.value, info_.format);
-  Voxel v;
-  const Box one{voxel, voxel + Index3(1)};
-  VOX_CHECK(decoder.decode_base(found.base_block, voxel - found.in_block, store_->levels[0].size, found.value,
-                                one, packed(v.bytes.data(), Index3(1), info_.format)));
-  return v;
+  return decode_base_voxel(found.base_block, store_->levels[0].size, found.in_block, info_.format,
+                           params_.base, params_.layout, found.value);
 }
 
 Status Volume::decode(const Box& box, int level, VoxelSpan out) const {

@@ -1,0 +1,60 @@
+// Cameras and camera paths (thesis sections 3.2.1 and 4.2). The volume is a box centred at the origin whose
+// longest side is 1.
+#pragma once
+
+#include <glm/vec3.hpp>
+#include <string>
+#include <vector>
+
+#include "formats/result.h"
+#include "formats/volume.h"
+
+namespace voxkit::render {
+
+/// A pinhole camera. x points right in the picture, y up, z to the viewer; the world's up is +y.
+struct Camera {
+  glm::dvec3 eye{0, 0, 2};
+  glm::dvec3 target{0, 0, 0};
+  double fov = 45;  ///< full vertical angle in degrees, 0 < fov < 180
+
+  /// Looks at the centre from azimuth `az` (degrees, 0 = from +z, 90 = from +x) and elevation `el` (-90..90,
+  /// from above positive).
+  static Camera orbit(double az, double el, double distance, double fov);
+};
+
+/// "orbit:AZ,EL,DIST" or "lookat:EX,EY,EZ,TX,TY,TZ"; ErrorCode::usage says what was expected.
+Result<Camera> parse_camera(const std::string& text, double fov);
+
+/// "thesis94": 94 frames, one full turn at distance 1.8 (64 frames), then in to 0.9 and out again (15 each),
+/// as in section 4.2; "orbit:N": N frames of one full turn. The camera gives elevation and field of view.
+Result<std::vector<Camera>> camera_path(const std::string& name, const Camera& camera);
+
+/// From world to grid coordinates of a volume: grid = (world + half) / voxel, half the box's half size, voxel
+/// the edges of a voxel.
+struct GridTransform {
+  explicit GridTransform(const VolumeInfo& info);
+  glm::dvec3 half, voxel;
+  glm::dvec3 point(const glm::dvec3& world) const { return (world + half) / voxel; }
+  glm::dvec3 direction(const glm::dvec3& world) const { return world / voxel; }
+  double smallest_edge() const { return std::min({voxel.x, voxel.y, voxel.z}); }
+};
+
+/// The rays of a picture: through pixel (x, y), counted from the upper left, at offset (0.5, 0.5) = its
+/// centre.
+class RayGenerator {
+ public:
+  RayGenerator(const Camera& camera, int width, int height);
+  /// Unit direction in the world.
+  glm::dvec3 direction(double x, double y) const;
+  const glm::dvec3& eye() const { return eye_; }
+  const glm::dvec3& forward() const { return forward_; }
+  /// Width of a pixel at distance 1 along the axis: the cone of a ray is this wide at distance t times t.
+  double pixel_width() const { return pixel_; }
+
+ private:
+  glm::dvec3 eye_, forward_, right_, up_;
+  int width_, height_;
+  double pixel_;
+};
+
+}  // namespace voxkit::render
