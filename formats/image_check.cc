@@ -6,13 +6,68 @@
 #include <algorithm>
 #include <array>
 #include <cstring>
+#include <span>
 #include <string_view>
+#include <utility>
 
 #include "formats/little_endian.h"
 #include "formats/mapped_file.h"
 
 namespace voxkit {
 namespace {
+
+/// Bytes of the OpenEXR attribute types whose readers take that many, whatever the file says.
+constexpr std::pair<std::string_view, size_t> exr_sizes[] = {{"box2f", 16},
+                                                             {"box2i", 16},
+                                                             {"chromaticities", 32},
+                                                             {"compression", 1},
+                                                             {"deepImageState", 1},
+                                                             {"double", 8},
+                                                             {"envmap", 1},
+                                                             {"float", 4},
+                                                             {"int", 4},
+                                                             {"keycode", 28},
+                                                             {"lineOrder", 1},
+                                                             {"m33d", 72},
+                                                             {"m33f", 36},
+                                                             {"m44d", 128},
+                                                             {"m44f", 64},
+                                                             {"rational", 8},
+                                                             {"tiledesc", 9},
+                                                             {"timecode", 8},
+                                                             {"v2d", 16},
+                                                             {"v2f", 8},
+                                                             {"v2i", 8},
+                                                             {"v3d", 24},
+                                                             {"v3f", 12},
+                                                             {"v3i", 12}};
+
+/// Whether the value of an OpenEXR attribute ends where its size says, for the types that end elsewhere if
+/// they like.
+bool exr_value_fits(std::string_view type, std::span<const std::byte> value) {
+  for (const auto& [name, size] : exr_sizes)
+    if (type == name) return value.size() == size;
+  if (type == "preview") {
+    if (value.size() < 8) return false;
+    const uint64_t pixels = uint64_t{load_le<uint32_t>(value.data())} * load_le<uint32_t>(value.data() + 4);
+    return (value.size() - 8) % 4 == 0 && pixels == (value.size() - 8) / 4;
+  }
+  if (type == "stringvector") {
+    while (!value.empty()) {
+      if (value.size() < 4 || load_le<uint32_t>(value.data()) > value.size() - 4) return false;
+      value = value.subspan(4 + load_le<uint32_t>(value.data()));
+    }
+  }
+  if (type == "chlist") {
+    while (!value.empty() && value[0] != std::byte{0}) {
+      const auto name_end = std::find(value.begin(), value.end(), std::byte{0});
+      if (value.end() - name_end < 17) return false;
+      value = value.subspan(static_cast<size_t>(name_end - value.begin()) + 17);
+    }
+    return value.size() == 1;
+  }
+  return type != "idmanifest";  // belongs to deep images, which are no volumes; unpacks to any size
+}
 
 uint32_t load_be(const std::byte* p) {
   return __builtin_bswap32(load_le<uint32_t>(p));
@@ -66,6 +121,9 @@ Status check_exr(const std::string& path) {
     const auto size = load_le<int32_t>(bytes.data() + type_end + 1);
     if (size < 0 || static_cast<size_t>(size) > text.size() - type_end - 5)
       return broken("an attribute leads past the end of the file");
+    const std::string_view type = text.substr(name_end + 1, type_end - name_end - 1);
+    if (!exr_value_fits(type, bytes.subspan(type_end + 5, static_cast<size_t>(size))))
+      return broken("the value of an attribute is not of the size that the file says");
     at = type_end + 5 + static_cast<size_t>(size);
   }
 }

@@ -131,12 +131,15 @@ class Walker {
     if (length) stream_.read(value.data(), length);
     return value;
   }
-  /// Names, types and values.
+  /// Names, types and values. The types that are registered take their size, whatever the file says.
   void metadata() {
     for (uint32_t count = number<uint32_t>(); count > 0; --count) {
       text();
-      text();
-      skip(number<uint32_t>());
+      const std::string type = text();
+      const uint32_t length = number<uint32_t>();
+      if ((type == "vec3i" && length != 12) || (type == "bool" && length != 1))
+        throw std::ios_base::failure("metadata of another length than its type");
+      skip(length);
     }
   }
 
