@@ -1,0 +1,173 @@
+// Pictures of compressed volumes are those of the volumes themselves, pixel by pixel.
+#include <gtest/gtest.h>
+
+#include <cmath>
+
+#include "formats/readers.h"
+#include "librender/shade.h"
+#include "tests/libsvmm/volumes.h"
+
+namespace voxkit::render {
+namespace {
+
+using svmm::test::context;
+
+std::shared_ptr<const svmm::Volume> compress(const char* name, double quality, std::vector<int> widths,
+                                             svmm::Base base = svmm::Base::raw) {
+  auto source = open_builtin(name);
+  svmm::Params params = svmm::test::make_params((*source)->info().format, quality, std::move(widths), 4);
+  params.base = base;
+  return svmm::test::encode_to_memory(**source, params).open();
+}
+
+std::shared_ptr<const DenseGrid> dense(VolumeSource& source) {
+  static MemoryBudget budget(uint64_t{1} << 32);
+  Context ctx = context();
+  ctx.memory = &budget;
+  auto grid = DenseGrid::read(source, ctx);
+  EXPECT_TRUE(grid);
+  return *grid;
+}
+
+CastOptions small() {
+  CastOptions options;
+  options.width = 97;
+  options.height = 71;
+  options.range = {0, 255};
+  return options;
+}
+
+/// What was seen, without what it cost.
+void expect_same_pixels(const Frame& a, const Frame& b, double tolerance) {
+  ASSERT_EQ(a.pixels.size(), b.pixels.size());
+  for (size_t i = 0; i < a.pixels.size(); ++i) {
+    for (int k = 0; k < 3; ++k) ASSERT_EQ(a.pixels[i].voxel[k], b.pixels[i].voxel[k]) << "pixel " << i;
+    ASSERT_EQ(a.pixels[i].distance, b.pixels[i].distance) << "pixel " << i;
+    for (int k = 0; k < 4; ++k)
+      ASSERT_NEAR(a.pixels[i].colour[k], b.pixels[i].colour[k], tolerance) << "pixel " << i;
+  }
+}
+
+TEST(Cast, CompressedEqualsDenseForEveryTraversalAndThreadCount) {
+  for (const char* name : {"menger:3", "menger:4", "sphere:40", "membrane:60,50,9:2"}) {
+    auto source = open_builtin(name);
+    const auto grid = dense(**source);
+    // Opaque voxels give the same colours to the bit; gathered opacity is rounded once a cell instead of once
+    // a voxel.
+    const double tolerance = (*source)->info().format == VoxelFormat::rgba32 ? 0 : 2e-6;
+    for (std::vector<int> widths : {std::vector<int>{}, std::vector<int>{4}}) {
+      const SvmmGrid compressed(compress(name, 100, widths));
+      for (const Camera& camera :
+           {Camera::orbit(30, 20, 1.8, 45), Camera::orbit(0, 0, 2, 45), Camera::orbit(45, -35, 0.6, 70),
+            Camera::orbit(90, 90, 1.5, 45), Camera{{0, 0, 0}, {1, 0.3, 0.2}, 60}}) {
+        CastOptions options = small();
+        Context one = context(1), seven = context(7);
+        const auto expected = cast(*grid, camera, options, one);
+        ASSERT_TRUE(expected);
+        EXPECT_GT(expected->rays_hit, 100u);
+        const auto path = cast(compressed, camera, options, one);
+        ASSERT_TRUE(path);
+        expect_same_pixels(*expected, *path, tolerance);
+        EXPECT_LE(path->cells_visited, expected->cells_visited);
+        const auto threads = cast(compressed, camera, options, seven);
+        expect_same_pixels(*path, *threads, 0);
+        options.traversal = Traversal::restart;
+        const auto restart = cast(compressed, camera, options, one);
+        expect_same_pixels(*path, *restart, 0);
+        EXPECT_GE(restart->blocks_touched, path->blocks_touched);
+        options.level_of_detail = true;
+        const auto coarse_restart = cast(compressed, camera, options, one);
+        options.traversal = Traversal::path;
+        const auto coarse_path = cast(compressed, camera, options, one);
+        expect_same_pixels(*coarse_path, *coarse_restart, 0);
+      }
+    }
+  }
+}
+
+TEST(Cast, EveryBaseIsDrawnAsItIsDecoded) {
+  using svmm::Base;
+  for (const Base base : {Base::bitmap, Base::alpha, Base::gray, Base::bc1})
+    for (const int w : {2, 4}) {
+      if (base == Base::bc1 && w == 2) continue;
+      const auto volume = compress("menger:3", 90, {w}, base);
+      auto decoded = svmm::open_source(volume, 0);
+      ASSERT_TRUE(decoded);
+      Context ctx = context();
+      const Camera camera = Camera::orbit(200, 30, 1.6, 45);
+      const auto expected = cast(*dense(**decoded), camera, small(), ctx);
+      const auto drawn = cast(SvmmGrid(volume), camera, small(), ctx);
+      expect_same_pixels(*expected, *drawn, 0);
+    }
+}
+
+TEST(Cast, ASphereIsRoundAndInTheMiddle) {
+  auto source = open_builtin("sphere:64");
+  CastOptions options = small();
+  options.width = options.height = 101;
+  Context ctx = context();
+  const auto frame = cast(*dense(**source), Camera::orbit(20, 10, 3, 30), options, ctx);
+  double x = 0, y = 0, area = 0;
+  for (int row = 0; row < 101; ++row)
+    for (int column = 0; column < 101; ++column)
+      if (std::isfinite(frame->pixels[static_cast<size_t>(row * 101 + column)].distance))
+        x += column, y += row, ++area;
+  EXPECT_NEAR(x / area, 50, 0.5);
+  EXPECT_NEAR(y / area, 50, 0.5);
+  // Radius 0.4 (and half a voxel of soft edge) at distance 3: the silhouette's sine is 0.4 / 3.
+  const double radius =
+      std::tan(std::asin((0.4 + 0.5 / 64) / 3)) / (2 * std::tan(15 * 3.14159265358979 / 180) / 101);
+  EXPECT_NEAR(area / (3.14159265358979 * radius * radius), 1, 0.03);
+  const auto& centre = frame->pixels[50 * 101 + 50];
+  EXPECT_NEAR(centre.distance, 2.6 - 0.5 / 64, 2.0 / 64);
+}
+
+TEST(Shade, NormalsOfASpherePointOutwards) {
+  auto source = open_builtin("sphere:96");
+  CastOptions options = small();
+  options.width = options.height = 200;
+  options.range = {127, 128};  // a hard edge
+  Context ctx = context();
+  const Camera camera = Camera::orbit(35, 25, 2, 40);
+  const auto frame = cast(*dense(**source), camera, options, ctx);
+  const auto picture = shade(*frame, camera, 1.0 / 96, {}, ctx);
+  ASSERT_TRUE(picture);
+  const RayGenerator rays(camera, 200, 200);
+  double worst = 0, sum = 0;
+  int count = 0;
+  for (int y = 0; y < 200; ++y)
+    for (int x = 0; x < 200; ++x) {
+      const size_t i = static_cast<size_t>(y * 200 + x);
+      if (!std::isfinite(frame->pixels[i].distance)) continue;
+      const glm::dvec3 d = rays.direction(x + 0.5, y + 0.5),
+                       p = rays.eye() + d * double(frame->pixels[i].distance);
+      const double length = std::sqrt(p.x * p.x + p.y * p.y + p.z * p.z);
+      const double facing = -(p.x * d.x + p.y * d.y + p.z * d.z) / length;
+      if (facing < 0.3) continue;  // the rim
+      const double cosine = (picture->normals[3 * i] * p.x + picture->normals[3 * i + 1] * p.y +
+                             picture->normals[3 * i + 2] * p.z) /
+                            length;
+      const double angle = std::acos(std::min(1.0, cosine)) * 180 / 3.14159265358979;
+      worst = std::max(worst, angle);
+      sum += angle;
+      ++count;
+    }
+  ASSERT_GT(count, 5000);
+  EXPECT_LT(sum / count, 20);
+  EXPECT_LT(worst, 90);
+}
+
+TEST(Camera, TextIsChecked) {
+  EXPECT_TRUE(parse_camera("orbit:10,20,1.5", 45));
+  EXPECT_TRUE(parse_camera("lookat:0,0,2,0,0,0", 45));
+  for (const char* wrong : {"", "orbit:", "orbit:1,2", "orbit:1,2,3,4", "orbit:1,91,2", "orbit:1,2,0",
+                            "lookat:1,1,1,1,1,1", "orbit:a,b,c", "orbit:1,2,3x", "orbit:nan,0,1"})
+    EXPECT_FALSE(parse_camera(wrong, 45)) << wrong;
+  EXPECT_EQ(camera_path("thesis94", Camera{})->size(), 94u);
+  EXPECT_EQ(camera_path("orbit:7", Camera{})->size(), 7u);
+  for (const char* wrong : {"", "thesis", "orbit:0", "orbit:1.5", "orbit:-3"})
+    EXPECT_FALSE(camera_path(wrong, Camera{})) << wrong;
+}
+
+}  // namespace
+}  // namespace voxkit::render
