@@ -2,6 +2,7 @@
 // lost, and keep the global bound.
 #include <fmt/format.h>
 
+#include <algorithm>
 #include <cmath>
 #include <cstdio>
 #include <cstdlib>
@@ -44,7 +45,10 @@ extern "C" int LLVMFuzzerTestOneInput(const uint8_t* data, size_t size) {
   constexpr size_t options = 15;
   if (size <= options) return 0;
   VolumeInfo info;
-  info.dims = {1 + data[0] % 70, 1 + data[1] % 40, 1 + data[2] % 40};
+  // Long along any axis, to be cut into several tiles, but of few voxels.
+  info.dims.x = 1 + data[0] % 70;
+  info.dims.y = 1 + data[1] % std::min<int64_t>(70, 4096 / info.dims.x);
+  info.dims.z = 1 + data[2] % std::min<int64_t>(70, std::max<int64_t>(1, 8192 / (info.dims.x * info.dims.y)));
   constexpr SampleType types[] = {SampleType::u8,  SampleType::u8,  SampleType::u8,
                                   SampleType::u16, SampleType::f32, SampleType::bit};
   info.format = static_cast<VoxelFormat>(1 + data[3] % 6);
