@@ -155,6 +155,10 @@ Result<ParamsAndLevels> unpack_params(std::span<const std::byte> bytes, const Vo
   params.quality = load_le<double>(&bytes[16]);
   params.delta = load_le<double>(&bytes[24]);
   params.full_scale = load_le<double>(&bytes[32]);
+  if (!(params.delta >= 0) || !std::isfinite(params.delta))
+    return bad(24, fmt::format("delta {}: expected 0 or more", params.delta));
+  if (!(params.full_scale > 0) || !std::isfinite(params.full_scale))
+    return bad(32, fmt::format("full scale {}: expected more than 0", params.full_scale));
   for (uint32_t k = 0; k < count; ++k) {
     const std::byte* p = &bytes[params_bytes + k * level_bytes];
     Level level;
@@ -173,9 +177,8 @@ Result<ParamsAndLevels> unpack_params(std::span<const std::byte> bytes, const Vo
     out.levels.push_back(level);
   }
   // The widths determine everything else; what the file says must be that.
-  Params expected_params = params;
-  if (auto valid = validate(expected_params, info); !valid) return bad(0, valid.error().what);
-  const auto expected = plan_levels(info, expected_params);
+  if (auto valid = validate(params, info); !valid) return bad(0, valid.error().what);
+  const auto expected = plan_levels(info, params);
   if (expected.size() != count) return bad(4, fmt::format("{} levels: expected {}", count, expected.size()));
   for (uint32_t k = 0; k < count; ++k) {
     const Level &a = out.levels[k], &b = expected[k];
