@@ -2,22 +2,20 @@
 #include <OpenImageIO/imageio.h>
 #include <fcntl.h>
 #include <fmt/format.h>
-#include <sys/stat.h>
 #include <unistd.h>
 
 #include <algorithm>
-#include <cctype>
 #include <cerrno>
 #include <cstdio>
 #include <filesystem>
-#include <map>
 #include <optional>
 #include <set>
 #include <string_view>
 #include <system_error>
 
 #include "formats/dense_source.h"
-#include "formats/image_check.h"
+#include "formats/image_file.h"
+#include "formats/image_input.h"
 #include "formats/module.h"
 #include "formats/natural_order.h"
 #include "formats/parallel.h"
@@ -32,32 +30,6 @@ using OIIO::ImageInput;
 using OIIO::ImageOutput;
 using OIIO::ImageSpec;
 using OIIO::TypeDesc;
-
-/// The first line of what OpenImageIO says; its longer messages go on with advice for programmers.
-std::string one_line(std::string text) {
-  while (!text.empty() && std::isspace(static_cast<unsigned char>(text.back()))) text.pop_back();
-  return text.empty() ? "unreadable image" : text.substr(0, text.find('\n'));
-}
-
-/// What follows the last dot, in lower case.
-std::string ending_of(const std::string& name) {
-  const size_t dot = name.find_last_of("./");
-  if (dot == std::string::npos || name[dot] == '/') return {};
-  std::string ending = name.substr(dot + 1);
-  for (char& c : ending) c = static_cast<char>(std::tolower(static_cast<unsigned char>(c)));
-  return ending;
-}
-
-/// OpenImageIO's name of the format. Naming it keeps the library from trying every reader it has on a damaged
-/// file.
-const char* image_format(const std::string& name) {
-  static const std::map<std::string, const char*, std::less<>> formats = {
-      {"tif", "tiff"}, {"tiff", "tiff"}, {"png", "png"},  {"exr", "openexr"},
-      {"jpg", "jpeg"}, {"jpeg", "jpeg"}, {"bmp", "bmp"},  {"pgm", "pnm"},
-      {"ppm", "pnm"},  {"pnm", "pnm"},   {"tga", "targa"}};
-  const auto it = formats.find(ending_of(name));
-  return it == formats.end() ? nullptr : it->second;
-}
 
 // ------------------------------------------------------------------------------------------------ names of
 // slices
@@ -226,44 +198,6 @@ bool same_pixels(const ImageSpec& a, const ImageSpec& b) {
   return a.width == b.width && a.height == b.height && a.nchannels == b.nchannels && a.format == b.format;
 }
 
-std::string describe(const ImageSpec& spec) {
-  return fmt::format("{} x {} with {} channel{} of {}", spec.width, spec.height, spec.nchannels,
-                     spec.nchannels == 1 ? "" : "s", spec.format.c_str());
-}
-
-/// Opens an image and checks that its size is one that its file and our memory can hold.
-Result<std::unique_ptr<ImageInput>> open_image(const std::string& path, uint64_t memory_limit) {
-  const char* format = image_format(path);
-  if (!format) return bad_input(path, "not an image that can be a slice: expected .tif, .png or .exr");
-  struct stat state {};
-  if (stat(path.c_str(), &state) != 0)
-    return bad_input(path, fmt::format("cannot open: {}", std::generic_category().message(errno)));
-  if (!S_ISREG(state.st_mode)) return bad_input(path, "not a regular file");
-  if (std::string_view(format) == "png") VOX_CHECK(check_png(path));
-  if (std::string_view(format) == "openexr") VOX_CHECK(check_exr(path));
-  auto input = ImageInput::create(format);
-  if (!input) return bad_input(path, fmt::format("OpenImageIO was built without {}", format));
-  input->threads(1);  // callers decode slices side by side
-  ImageSpec spec, config;
-  config.attribute("oiio:UnassociatedAlpha", 1);  // colours as they are in the file, not multiplied by alpha
-  if (!input->open(path, spec, config)) {
-    const std::string text = input->geterror();
-    if (text.find("limits:imagesize_MB") != std::string::npos)
-      return fail(ErrorCode::limit, path, "one image takes more than half of --max-memory");
-    return bad_input(path, one_line(text));
-  }
-  if (spec.width < 1 || spec.height < 1) return bad_input(path, "image without pixels");
-  const uint64_t bytes = spec.image_bytes();
-  if (bytes / 65536 > static_cast<uint64_t>(state.st_size) + 16)
-    return bad_input(path, fmt::format("header says {}: a file of {} bytes cannot hold that", describe(spec),
-                                       static_cast<int64_t>(state.st_size)));
-  if (bytes > memory_limit / 2)
-    return fail(
-        ErrorCode::limit, path,
-        fmt::format("one image takes {} bytes: more than half of --max-memory, {}", bytes, memory_limit));
-  return input;
-}
-
 class ImageStack : public SlicedSource {
  public:
   static SourceResult open(std::vector<std::string> files, bool pages, Context& ctx) {
@@ -381,8 +315,7 @@ class ImageStack : public SlicedSource {
 
 SourceResult open_stack(const std::string& name, const std::string&, Context& ctx) {
   try {
-    OIIO::attribute("limits:imagesize_MB",
-                    static_cast<int>(std::clamp<uint64_t>(ctx.memory->limit() >> 21, 1, 1 << 30)));
+    limit_image_size(ctx);
     std::error_code ignored;
     if (fs::is_directory(name, ignored)) {
       VOX_TRY(auto files, slices_of_folder(name));
@@ -558,7 +491,10 @@ class ImageStackSink : public VolumeSink {
   int64_t next_ = 0;
 };
 
-const ModuleTable table{.open = open_stack, .create = ImageStackSink::create};
+const ModuleTable table{.open = open_stack,
+                        .create = ImageStackSink::create,
+                        .read_image = read_image_file,
+                        .write_image = write_image_file};
 
 }  // namespace
 }  // namespace voxkit

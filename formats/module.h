@@ -6,14 +6,16 @@
 #pragma once
 
 #include <cstdint>
+#include <optional>
 #include <string>
 
+#include "formats/image.h"
 #include "formats/readers.h"
 
 namespace voxkit {
 
 /// Grows with every change of ModuleTable or of a type that it mentions.
-inline constexpr uint32_t module_abi = 1;
+inline constexpr uint32_t module_abi = 2;
 
 struct ModuleTable {
   uint32_t abi = module_abi;
@@ -21,6 +23,9 @@ struct ModuleTable {
   SourceResult (*open)(const std::string& path, const std::string& grid, Context& ctx) = nullptr;
   /// Null in modules that only read.
   SinkResult (*create)(const std::string& path, const VolumeInfo& info, bool force, Context& ctx) = nullptr;
+  /// Single images (image_stack only): `read_image` and `write_image` of image.h.
+  Result<std::optional<Image>> (*read_image)(const std::string& path, Context& ctx) = nullptr;
+  Status (*write_image)(const std::string& path, const Image& image, bool force) = nullptr;
 };
 
 /// A module, and what to tell a user who does not have it.

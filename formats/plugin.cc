@@ -71,6 +71,19 @@ SinkResult create_image_stack(const std::string& pattern, const VolumeInfo& info
                    info, force, ctx);
 }
 
+Result<std::optional<Image>> read_image(const std::string& path, Context& ctx) {
+  auto table = load_module(module_folder(), {"image_stack", "reading images", "libopenimageio-dev"});
+  if (!table) return fail(table.error().code, path, table.error().what);
+  return (*table)->read_image(path, ctx);
+}
+
+Status write_image(const std::string& path, const Image& image, bool force) {
+  auto table = load_module(module_folder(),
+                           {"image_stack", "writing images", "libopenimageio-dev", ErrorCode::usage});
+  if (!table) return fail(table.error().code, path, table.error().what);
+  return (*table)->write_image(path, image, force);
+}
+
 SourceResult open_vdb(const std::string& path, const std::string& grid, Context& ctx) {
   return open_by({"openvdb", "reading .vdb files", "libopenvdb-dev"}, path, grid, ctx);
 }
