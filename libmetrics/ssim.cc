@@ -1,0 +1,231 @@
+#include "libmetrics/ssim.h"
+
+#include <fmt/core.h>
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <vector>
+
+#include "formats/parallel.h"
+
+namespace voxkit {
+namespace {
+
+constexpr int max_taps = 11;
+constexpr std::array<double, 5> scale_weights{0.0448, 0.2856, 0.3001, 0.2363, 0.1333};
+
+/// A normalised Gaussian of sigma 1.5, as long as fits a side.
+struct Gaussian {
+  explicit Gaussian(int64_t side) : taps(static_cast<int>(std::min<int64_t>(side, max_taps))) {
+    double sum = 0;
+    for (int i = 0; i < taps; ++i) {
+      const double x = i - 0.5 * (taps - 1);
+      weights[static_cast<size_t>(i)] = std::exp(-x * x / (2 * 1.5 * 1.5));
+      sum += weights[static_cast<size_t>(i)];
+    }
+    for (double& w : weights) w /= sum;
+  }
+  int taps;
+  std::array<double, max_taps> weights{};
+};
+
+/// out = the sum of weight k times tap(k), which are rows of n values. Taps of equal weight are added first.
+template <class Tap>
+void filter(const Gaussian& g, const Tap& tap, int64_t n, double* __restrict out) {
+  std::fill_n(out, n, 0.0);
+  for (int k = 0; k < g.taps / 2; ++k) {
+    const double *p = tap(k), *q = tap(g.taps - 1 - k), w = g.weights[static_cast<size_t>(k)];
+    for (int64_t i = 0; i < n; ++i) out[i] += w * (p[i] + q[i]);
+  }
+  if (g.taps % 2 != 0) {
+    const double *p = tap(g.taps / 2), w = g.weights[static_cast<size_t>(g.taps / 2)];
+    for (int64_t i = 0; i < n; ++i) out[i] += w * p[i];
+  }
+}
+
+struct Sums {
+  double ssim = 0, contrast_structure = 0;
+};
+
+/// The sums over a block of windows, small enough that the rows under the filter stay in the cache.
+class Block {
+ public:
+  static constexpr int64_t width = 128, height = 64;
+
+  Block(const Gaussian& gx, const Gaussian& gy, double c1, double c2) : gx_(gx), gy_(gy), c1_(c1), c2_(c2) {}
+
+  /// The windows whose upper left samples are (x0, y0) .. (x1, y1), half open.
+  Sums sums(const Image& a, const Image& b, int64_t x0, int64_t y0, int64_t x1, int64_t y1) {
+    const int64_t n = x1 - x0;
+    std::fill_n(ssim_, n, 0.0);
+    std::fill_n(contrast_structure_, n, 0.0);
+    for (int64_t y = y0; y < y1 + gy_.taps - 1; ++y) {
+      filter_row(a.row(y) + x0, b.row(y) + x0, n, filtered_[y % gy_.taps]);
+      const int64_t top = y - (gy_.taps - 1);
+      if (top >= y0) add_windows(top, n);
+    }
+    Sums sums;
+    for (int64_t i = 0; i < n; ++i) {
+      sums.ssim += ssim_[i];
+      sums.contrast_structure += contrast_structure_[i];
+    }
+    return sums;
+  }
+
+ private:
+  /// The moments whose means SSIM is made of. It needs no more of the squares than their sum.
+  enum Moment { mean_a, mean_b, squares, product, moments };
+  using Row = double[width];
+
+  void filter_row(const float* a, const float* b, int64_t n, Row* out) {
+    const int64_t samples = n + gx_.taps - 1;
+    for (int64_t i = 0; i < samples; ++i) {
+      const double va = a[i], vb = b[i];
+      moments_[mean_a][i] = va;
+      moments_[mean_b][i] = vb;
+      moments_[squares][i] = va * va + vb * vb;
+      moments_[product][i] = va * vb;
+    }
+    for (int m = 0; m < moments; ++m)
+      filter(
+          gx_, [&](int k) { return moments_[m] + k; }, n, out[m]);
+  }
+
+  void add_windows(int64_t top, int64_t n) {
+    for (int m = 0; m < moments; ++m)
+      filter(
+          gy_, [&](int k) { return filtered_[(top + k) % gy_.taps][m]; }, n, means_[m]);
+    for (int64_t i = 0; i < n; ++i) {
+      const double a = means_[mean_a][i], b = means_[mean_b][i];
+      const double ab = a * b, aa_bb = a * a + b * b;
+      // Where a sample is huge, rounding could break |2 covariance| <= sum of variances; a NaN passes
+      // through.
+      const double variances = std::max(means_[squares][i] - aa_bb, 0.0);
+      const double covariance2 = std::min(std::max(2 * (means_[product][i] - ab), -variances), variances);
+      const double contrast_structure = (covariance2 + c2_) / (variances + c2_);
+      const double luminance = (2 * ab + c1_) / (aa_bb + c1_);
+      contrast_structure_[i] += contrast_structure;
+      ssim_[i] += luminance * contrast_structure;
+    }
+  }
+
+  const Gaussian &gx_, &gy_;
+  double c1_, c2_;
+  double moments_[moments][width + max_taps - 1];
+  Row filtered_[max_taps][moments];  ///< along x; row y is at y % taps
+  Row means_[moments];
+  Row ssim_, contrast_structure_;  ///< summed along y
+};
+
+/// The means over all windows of one scale.
+Result<Sums> mean_ssim(const Image& a, const Image& b, double peak, const Context& ctx) {
+  const double c1 = 0.01 * peak * (0.01 * peak), c2 = 0.03 * peak * (0.03 * peak);
+  const Gaussian gx(a.width()), gy(a.height());
+  const int64_t width = a.width() - gx.taps + 1, height = a.height() - gy.taps + 1;
+  const int64_t across = (width + Block::width - 1) / Block::width;
+  const int64_t blocks = across * ((height + Block::height - 1) / Block::height);
+  std::vector<Sums> parts(static_cast<size_t>(blocks));
+  VOX_CHECK(parallel_for(ctx, blocks, [&](int64_t i) -> Status {
+    const int64_t x = i % across * Block::width, y = i / across * Block::height;
+    Block block(gx, gy, c1, c2);
+    parts[static_cast<size_t>(i)] =
+        block.sums(a, b, x, y, std::min(x + Block::width, width), std::min(y + Block::height, height));
+    return {};
+  }));
+  Sums total;
+  for (const Sums& part : parts) {
+    total.ssim += part.ssim;
+    total.contrast_structure += part.contrast_structure;
+  }
+  const double windows = static_cast<double>(width) * static_cast<double>(height);
+  return Sums{total.ssim / windows, total.contrast_structure / windows};
+}
+
+/// Calls `body(y)` for every row, several at once.
+template <class Body>
+Status for_rows(int64_t height, const Context& ctx, const Body& body) {
+  constexpr int64_t rows_at_once = 32;
+  return parallel_for(ctx, (height + rows_at_once - 1) / rows_at_once, [&](int64_t i) -> Status {
+    for (int64_t y = i * rows_at_once; y < std::min((i + 1) * rows_at_once, height); ++y) body(y);
+    return {};
+  });
+}
+
+Result<Image> halved(const Image& image, Context& ctx) {
+  VOX_TRY(Image half,
+          Image::create((image.width() + 1) / 2, (image.height() + 1) / 2, 1, SampleType::f32, ctx));
+  VOX_CHECK(for_rows(half.height(), ctx, [&](int64_t y) {
+    const float *p = image.row(2 * y), *q = image.row(std::min(2 * y + 1, image.height() - 1));
+    float* out = half.row(y);
+    const auto mean = [](double s, double t, double u, double v) {
+      return static_cast<float>(0.25 * ((s + t) + (u + v)));
+    };
+    const int64_t pairs = image.width() / 2;
+    for (int64_t x = 0; x < pairs; ++x) out[x] = mean(p[2 * x], p[2 * x + 1], q[2 * x], q[2 * x + 1]);
+    if (pairs < half.width()) out[pairs] = mean(p[2 * pairs], p[2 * pairs], q[2 * pairs], q[2 * pairs]);
+  }));
+  return half;
+}
+
+}  // namespace
+
+Result<Ssim> ssim(const Image& a, const Image& b, std::optional<double> peak, Context& ctx) {
+  if (a.channels() != 1 || b.channels() != 1 || a.type() != b.type() || a.width() != b.width() ||
+      a.height() != b.height())
+    return bad_usage(fmt::format(
+        "SSIM of {} x {} x {} and {} x {} x {} samples: expected one channel of the same size and type",
+        a.width(), a.height(), a.channels(), b.width(), b.height(), b.channels()));
+  const double scale = peak ? *peak : a.peak();
+  const int64_t side = std::min(a.width(), a.height());
+  Ssim result;
+  result.scales = 1;
+  const int most = static_cast<int>(scale_weights.size());
+  while (result.scales < most && (int64_t{max_taps} << result.scales) <= side) ++result.scales;
+
+  std::array<double, scale_weights.size()> terms{};
+  std::optional<Image> half_a, half_b;
+  for (int s = 0; s < result.scales; ++s) {
+    if (s > 0) {
+      VOX_TRY(half_a, halved(half_a ? *half_a : a, ctx));
+      VOX_TRY(half_b, halved(half_b ? *half_b : b, ctx));
+    }
+    VOX_TRY(const Sums means, mean_ssim(half_a ? *half_a : a, half_b ? *half_b : b, scale, ctx));
+    if (s == 0) result.ssim = means.ssim;
+    terms[static_cast<size_t>(s)] = s + 1 < result.scales ? means.contrast_structure : means.ssim;
+  }
+  double weights = 0;
+  for (int s = 0; s < result.scales; ++s) weights += scale_weights[static_cast<size_t>(s)];
+  result.ms_ssim = 1;
+  for (size_t s = 0; s < static_cast<size_t>(result.scales); ++s)
+    result.ms_ssim *= std::pow(std::max(terms[s], 0.0), scale_weights[s] / weights);
+  return result;
+}
+
+Result<Image> luma(const Image& image, Context& ctx) {
+  if (image.colours() == 1) return channel(image, 0, ctx);
+  VOX_TRY(Image out, Image::create(image.width(), image.height(), 1, image.type(), ctx));
+  const int64_t channels = image.channels();
+  VOX_CHECK(for_rows(image.height(), ctx, [&](int64_t y) {
+    const float* in = image.row(y);
+    for (int64_t x = 0; x < image.width(); ++x, in += channels) {
+      const double r = in[0], g = in[1], b = in[2];
+      out.row(y)[x] = static_cast<float>(0.2126 * r + 0.7152 * g + 0.0722 * b);
+    }
+  }));
+  return out;
+}
+
+Result<Image> channel(const Image& image, int index, Context& ctx) {
+  if (index < 0 || index >= image.channels())
+    return bad_usage(fmt::format("channel {}: expected 0 to {}", index, image.channels() - 1));
+  VOX_TRY(Image out, Image::create(image.width(), image.height(), 1, image.type(), ctx));
+  const int64_t channels = image.channels();
+  VOX_CHECK(for_rows(image.height(), ctx, [&](int64_t y) {
+    const float* in = image.row(y) + index;
+    for (int64_t x = 0; x < image.width(); ++x) out.row(y)[x] = in[x * channels];
+  }));
+  return out;
+}
+
+}  // namespace voxkit
