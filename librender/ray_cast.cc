@@ -3,6 +3,8 @@
 #include <algorithm>
 #include <chrono>
 #include <cmath>
+#include <limits>
+#include <type_traits>
 
 #include "formats/parallel.h"
 #include "librender/ray.h"
@@ -50,6 +52,17 @@ class ColourOf {
   double lo_, scale_;
 };
 
+/// Front-to-back blending of `length` base voxels of one colour; true when the ray has become opaque.
+bool blend(const Colour& colour, double length, Pixel& pixel) {
+  const float alpha = colour.alpha >= 1
+                          ? 1.0f
+                          : static_cast<float>(1 - std::pow(1 - static_cast<double>(colour.alpha), length));
+  const float weight = alpha * (1 - pixel.colour[3]);
+  for (int k = 0; k < 3; ++k) pixel.colour[k] += weight * colour.rgb[k];
+  pixel.colour[3] += weight;
+  return pixel.colour[3] >= opaque;
+}
+
 /// Follows one ray (sections 3.2.1 to 3.2.4).
 template <class Cursor>
 Pixel follow(GridRay& ray, Cursor& cursor, const ColourOf& colour_of, double cone, double edge) {
@@ -69,14 +82,53 @@ Pixel follow(GridRay& ray, Cursor& cursor, const ColourOf& colour_of, double con
       pixel.distance = static_cast<float>(entered);
       for (int a = 0; a < 3; ++a) pixel.voxel[a] = static_cast<int32_t>(voxel[a]);
     }
-    const double length = (t - entered) / edge;
-    const float alpha = colour.alpha >= 1
-                            ? 1.0f
-                            : static_cast<float>(1 - std::pow(1 - static_cast<double>(colour.alpha), length));
-    const float weight = alpha * (1 - pixel.colour[3]);
-    for (int k = 0; k < 3; ++k) pixel.colour[k] += weight * colour.rgb[k];
-    pixel.colour[3] += weight;
-    if (pixel.colour[3] >= opaque) break;
+    if (blend(colour, (t - entered) / edge, pixel)) break;
+  }
+  return pixel;
+}
+
+/// Algorithm 1 of the thesis as it is published: floats, accumulated from voxel to voxel.
+Pixel follow_baseline(const double (&origin)[3], const double (&direction)[3], const int64_t (&dims)[3],
+                      DenseGrid::Cursor& cursor, const ColourOf& colour_of, double edge) {
+  Pixel pixel;
+  float o[3], d[3], delta[3], t_max[3], t_enter = 0, t_leave = std::numeric_limits<float>::infinity();
+  for (int a = 0; a < 3; ++a) {
+    o[a] = static_cast<float>(origin[a]);
+    d[a] = static_cast<float>(direction[a]);
+    const float near = (d[a] < 0 ? static_cast<float>(dims[a]) - o[a] : -o[a]) / d[a];
+    const float far = (d[a] < 0 ? -o[a] : static_cast<float>(dims[a]) - o[a]) / d[a];
+    if (d[a] == 0 && (o[a] < 0 || o[a] >= static_cast<float>(dims[a]))) return pixel;
+    if (d[a] == 0) continue;
+    t_enter = std::max(t_enter, near);
+    t_leave = std::min(t_leave, far);
+  }
+  if (t_enter >= t_leave) return pixel;
+  int64_t voxel[3], step[3];
+  for (int a = 0; a < 3; ++a) {
+    const float at = o[a] + d[a] * t_enter;
+    voxel[a] = std::clamp<int64_t>(static_cast<int64_t>(std::floor(at)), 0, dims[a] - 1);
+    step[a] = d[a] < 0 ? -1 : 1;
+    delta[a] = d[a] == 0 ? std::numeric_limits<float>::infinity() : std::abs(1 / d[a]);
+    t_max[a] =
+        d[a] == 0 ? delta[a] : t_enter + (static_cast<float>(voxel[a] + (d[a] < 0 ? 0 : 1)) - at) / d[a];
+  }
+  Cell cell;
+  for (float t = t_enter;;) {
+    cursor.locate(voxel, 0, cell);
+    ++pixel.cells;
+    const int axis = t_max[0] <= t_max[1] ? (t_max[0] <= t_max[2] ? 0 : 2) : (t_max[1] <= t_max[2] ? 1 : 2);
+    const float entered = t;
+    t = t_max[axis];
+    if (const Colour colour = colour_of(cell.value); colour.alpha > 0) {
+      if (pixel.voxel[0] < 0) {
+        pixel.distance = entered;
+        for (int a = 0; a < 3; ++a) pixel.voxel[a] = static_cast<int32_t>(voxel[a]);
+      }
+      if (blend(colour, static_cast<double>(t - entered) / edge, pixel)) break;
+    }
+    t_max[axis] += delta[axis];
+    voxel[axis] += step[axis];
+    if (voxel[axis] < 0 || voxel[axis] >= dims[axis]) break;
   }
   return pixel;
 }
@@ -112,8 +164,15 @@ Result<Frame> cast_with(const Grid& grid, const Camera& camera, const CastOption
       for (int x = x0; x < std::min(x0 + tile, options.width); ++x) {
         const glm::dvec3 d = transform.direction(rays.direction(x + 0.5, y + 0.5));
         const double direction[3] = {d.x, d.y, d.z};
-        GridRay ray(origin, direction, dims);
-        const Pixel pixel = follow(ray, cursor, colour_of, cone, edge);
+        Pixel pixel;
+        if constexpr (std::is_same_v<Grid, DenseGrid>) {
+          if (options.traversal == Traversal::baseline)
+            pixel = follow_baseline(origin, direction, dims, cursor, colour_of, edge);
+        }
+        if (options.traversal != Traversal::baseline) {
+          GridRay ray(origin, direction, dims);
+          pixel = follow(ray, cursor, colour_of, cone, edge);
+        }
         ++count.rays;
         count.rays_hit += pixel.voxel[0] >= 0;
         count.cells_visited += pixel.cells;
@@ -162,6 +221,8 @@ Result<Frame> cast(const DenseGrid& grid, const Camera& camera, const CastOption
 }
 
 Result<Frame> cast(const SvmmGrid& grid, const Camera& camera, const CastOptions& options, Context& ctx) {
+  if (options.traversal == Traversal::baseline)
+    return bad_usage("the baseline traversal steps through uncompressed volumes: expected path or restart");
   if (options.traversal == Traversal::restart)
     return cast_with<SvmmGrid, SvmmGrid::Cursor<true>>(grid, camera, options, ctx);
   return cast_with<SvmmGrid, SvmmGrid::Cursor<false>>(grid, camera, options, ctx);

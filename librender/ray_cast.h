@@ -27,7 +27,10 @@ struct Frame {
   double seconds = 0;  ///< of casting alone
 };
 
-enum class Traversal { path, restart };
+/// path: keeps the path of blocks from the root. restart: searches from the root at every step
+/// (section 3.2.2). baseline: Algorithm 1, one voxel a step with an accumulating float DDA, on dense volumes
+/// only; what the others are measured against.
+enum class Traversal { path, restart, baseline };
 
 struct CastOptions {
   int width = 1024, height = 768;

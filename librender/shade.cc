@@ -179,4 +179,21 @@ Result<Picture> shade(const Frame& frame, const Camera& camera, double voxel, co
   return picture;
 }
 
+Picture downsample(const Picture& picture, int n) {
+  Picture out;
+  out.width = picture.width / n;
+  out.height = picture.height / n;
+  out.rgba.resize(4 * static_cast<size_t>(out.width) * static_cast<size_t>(out.height));
+  for (size_t y = 0, i = 0; y < static_cast<size_t>(out.height); ++y)
+    for (size_t x = 0; x < static_cast<size_t>(out.width); ++x)
+      for (size_t k = 0; k < 4; ++k, ++i) {
+        double sum = 0;
+        for (size_t v = y * static_cast<size_t>(n); v < (y + 1) * static_cast<size_t>(n); ++v)
+          for (size_t u = x * static_cast<size_t>(n); u < (x + 1) * static_cast<size_t>(n); ++u)
+            sum += static_cast<double>(picture.rgba[4 * (v * static_cast<size_t>(picture.width) + u) + k]);
+        out.rgba[i] = static_cast<float>(sum / (n * n));
+      }
+  return out;
+}
+
 }  // namespace voxkit::render

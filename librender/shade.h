@@ -27,4 +27,7 @@ struct Picture {
 Result<Picture> shade(const Frame& frame, const Camera& camera, double voxel, const ShadeOptions& options,
                       Context& ctx);
 
+/// Averages n x n pixels into one: the reference for anti-aliasing. The sides are multiples of n.
+Picture downsample(const Picture& picture, int n);
+
 }  // namespace voxkit::render

@@ -1,4 +1,4 @@
-// vox-render: pictures of volumes, compressed or not, and what they cost.
+// vox-render: pictures of volumes, compressed or not, what they cost, and how far they are from a reference.
 #include <fmt/core.h>
 
 #include <algorithm>
@@ -7,9 +7,10 @@
 #include <numeric>
 
 #include "formats/copy.h"
-#include "formats/full_scale.h"
 #include "formats/image.h"
 #include "formats/output_file.h"
+#include "libmetrics/image_diff.h"
+#include "libmetrics/ssim.h"
 #include "librender/shade.h"
 #include "tools/common/input.h"
 #include "tools/common/json.h"
@@ -21,7 +22,7 @@ namespace {
 using namespace voxkit::render;
 
 struct Options {
-  std::string input, output, path, report;
+  std::string input, output, path, report, reference;
   OpenOptions open;
   int width = 1024, height = 768;
   std::string camera = "orbit:30,20,1.8", traversal = "path", shade = "phong", aa = "none", lod = "off",
@@ -33,7 +34,7 @@ struct Options {
 
 void declare(CommandLine& line, Options& o) {
   line.argument("INPUT", "Volume: a file, a built-in such as menger:5, or -", o.input);
-  line.text("-o,--output", "OUT", "Picture (.png, .tif), with --path a pattern such as frame-%04d.png",
+  line.text("-o,--output", "OUT", "Picture (.png .tif .exr), with --path a pattern such as frame-%04d.png",
             o.output);
   line.option("--size", "WxH", "Size of the picture in pixels (1024x768)",
               [&o](const std::string& text) -> Status {
@@ -51,12 +52,14 @@ void declare(CommandLine& line, Options& o) {
   line.option("--fov", "DEG", "Vertical field of view (45)", number(o.fov, 0.01, 179));
   line.text("--path", "PATH", "A camera path: thesis94 or orbit:N", o.path);
   line.option("--traversal", "KIND",
-              "path: keeps the path of blocks; restart: from the root at every step (path)",
-              one_of(o.traversal, {"path", "restart"}));
+              "path: keeps the path of blocks; restart: from the root at every step; baseline: voxel by "
+              "voxel in floats, dense volumes "
+              "only (path)",
+              one_of(o.traversal, {"path", "restart", "baseline"}));
   line.option("--shade", "KIND", "none, phong, ssao or phong+ssao (phong)",
               one_of(o.shade, {"none", "phong", "ssao", "phong+ssao"}));
-  line.option("--aa", "KIND", "none, or depth: softens steps in depth (none)",
-              one_of(o.aa, {"none", "depth"}));
+  line.option("--aa", "KIND", "none; depth: softens steps in depth; ssaa:N: N x N rays a pixel (none)",
+              one_of(o.aa, {"none", "depth", "ssaa:2", "ssaa:3", "ssaa:4", "ssaa:8"}));
   line.option("--lod", "on|off", "Stop at voxels as small as a pixel (off)", one_of(o.lod, {"on", "off"}));
   line.option("--device", "DEVICE", "Where to render: cpu (cpu)", one_of(o.device, {"cpu", "cuda"}));
   line.option("--range", "LO,HI",
@@ -68,37 +71,98 @@ void declare(CommandLine& line, Options& o) {
                 o.range = ValueRange{ends[0], ends[1]};
                 return {};
               });
+  line.text("--reference", "INPUT2", "Render this as well, and report how far the pictures are apart",
+            o.reference);
   line.text("--report", "OUT.json", "Write what every frame cost", o.report);
   line.flag("--no-images", "Render and report only", o.no_images);
   declare_input_options(line, o.open);
 }
 
-/// Writes an 8-bit RGB picture.
-Status write_picture(const Picture& picture, const std::string& name, Run& run) {
-  VOX_TRY(Image image, Image::create(picture.width, picture.height, 3, SampleType::u8, run.ctx));
+/// A volume that is ready to be drawn.
+struct Scene {
+  VolumeInfo info;
+  std::optional<SvmmGrid> compressed;
+  std::shared_ptr<const DenseGrid> dense;
+  ValueRange range{0, 255};
+
+  Result<Frame> draw(const Camera& camera, CastOptions options, Context& ctx) const {
+    options.range = range;
+    return compressed ? cast(*compressed, camera, options, ctx) : cast(*dense, camera, options, ctx);
+  }
+};
+
+Result<Scene> open_scene(const std::string& name, const Options& o, Run& run) {
+  VOX_TRY(Input input, open_input(name, o.open, run.ctx));
+  Scene scene;
+  scene.info = input.source->info();
+  const VoxelFormat format = scene.info.format;
+  if (o.range) {
+    scene.range = {o.range->lo + scene.info.bias(), o.range->hi + scene.info.bias()};
+  } else if (format == VoxelFormat::density16 || format == VoxelFormat::float32) {
+    if (name == "-")
+      return bad_usage(
+          "the values of a stream cannot be looked at twice: give their range with --range LO,HI");
+    run.stage("measure");
+    VOX_TRY(const Input again, open_input(name, o.open, run.ctx));
+    VOX_TRY(scene.range, measure_range(*again.source, run.ctx));
+  }
+  if (input.svmm) {
+    scene.compressed.emplace(input.svmm);
+  } else {
+    run.stage("read");
+    VOX_TRY(scene.dense, DenseGrid::read(*input.source, run.ctx));
+  }
+  return scene;
+}
+
+/// An 8-bit RGB picture.
+Result<Image> image_of(const Picture& picture, Context& ctx) {
+  VOX_TRY(Image image, Image::create(picture.width, picture.height, 3, SampleType::u8, ctx));
   for (int64_t y = 0; y < image.height(); ++y)
     for (int64_t x = 0; x < image.width(); ++x)
       for (int64_t k = 0; k < 3; ++k)
         image.row(y)[3 * x + k] =
             std::round(255 * picture.rgba[static_cast<size_t>(4 * (y * image.width() + x) + k)]);
-  return write_image(name, image, run.options.force);
+  return image;
 }
 
+/// What the frames of one volume cost.
+struct Costs {
+  Json frames = Json::array();
+  std::vector<double> ms;
+  uint64_t rays = 0;
+
+  double average() const {
+    return std::accumulate(ms.begin(), ms.end(), 0.0) / static_cast<double>(ms.size());
+  }
+  double mrays_per_s() const {
+    return static_cast<double>(rays) / 1e3 / std::max(average() * static_cast<double>(ms.size()), 1e-9);
+  }
+  void add(const Frame& frame, Json json) {
+    ms.push_back(frame.seconds * 1000);
+    rays += frame.rays;
+    json.set("ms", ms.back())
+        .set("rays", frame.rays)
+        .set("rays_hit", frame.rays_hit)
+        .set("samples", uint64_t{0});
+    json.set("cells_visited", frame.cells_visited).set("blocks_touched", frame.blocks_touched);
+    frames.push(std::move(json));
+  }
+  void write(Json& json) {
+    json.set("frames", std::move(frames));
+    json.set("ms_min", *std::min_element(ms.begin(), ms.end())).set("ms_avg", average());
+    json.set("ms_max", *std::max_element(ms.begin(), ms.end())).set("mrays_per_s", mrays_per_s());
+  }
+};
+
 /// The name of a frame: the pattern's number filled in.
-std::string frame_name(const std::string& pattern, size_t frame) {
-  const size_t percent = pattern.find('%'), d = pattern.find('d', percent);
+Result<std::string> frame_name(const std::string& pattern, size_t frame) {
+  const size_t percent = pattern.find('%'), d = pattern.find_first_not_of("0123456789", percent + 1);
+  if (d == std::string::npos || pattern[d] != 'd' || d - percent > 4)
+    return bad_usage("-o " + pattern + ": expected one %d or %04d in the name");
   const int width = std::atoi(pattern.c_str() + percent + 1);
   return pattern.substr(0, percent) + fmt::format("{:0{}}", frame, std::max(width, 1)) +
          pattern.substr(d + 1);
-}
-
-Json json_of(const Frame& frame) {
-  Json json = Json::object();
-  json.set("ms", frame.seconds * 1000).set("rays", frame.rays).set("rays_hit", frame.rays_hit);
-  json.set("samples", uint64_t{0})
-      .set("cells_visited", frame.cells_visited)
-      .set("blocks_touched", frame.blocks_touched);
-  return json;
 }
 
 Result<int> work(const Options& o, Run& run) {
@@ -110,74 +174,94 @@ Result<int> work(const Options& o, Run& run) {
   if (!o.path.empty()) {
     VOX_TRY(cameras, camera_path(o.path, camera));
   }
-  const bool images = !o.no_images;
-  const bool pattern = o.output.find('%') != std::string::npos;
-  if (images && !o.path.empty() && !pattern)
-    return bad_usage("-o " + o.output + ": a path needs a pattern such as frame-%04d.png");
-  for (size_t i = 0; images && i < cameras.size(); ++i)
-    VOX_CHECK(check_image_output(pattern ? frame_name(o.output, i) : o.output, run.options.force));
-  if (!o.report.empty()) VOX_CHECK(check_output(o.report, run.options.force));
-
-  VOX_TRY(Input input, open_input(o.input, o.open, run.ctx));
-  const VolumeInfo info = input.source->info();
-  CastOptions cast_options;
-  cast_options.width = o.width;
-  cast_options.height = o.height;
-  cast_options.traversal = o.traversal == "restart" ? Traversal::restart : Traversal::path;
-  cast_options.level_of_detail = o.lod == "on";
-  std::optional<SvmmGrid> compressed;
-  std::shared_ptr<const DenseGrid> dense;
-  if (input.svmm) {
-    compressed.emplace(input.svmm);
-  } else {
-    run.stage("read");
-    VOX_TRY(dense, DenseGrid::read(*input.source, run.ctx));
-  }
-  if (o.range) {
-    cast_options.range = {o.range->lo + info.bias(), o.range->hi + info.bias()};
-  } else if (info.format == VoxelFormat::density16 || info.format == VoxelFormat::float32) {
-    if (input.svmm && input.svmm->params().full_scale > 1 && info.format == VoxelFormat::density16) {
-      cast_options.range = {static_cast<double>(info.bias()), info.bias() + input.svmm->params().full_scale};
-    } else {
-      VOX_TRY(auto again, open_input(o.input, o.open, run.ctx));
-      VOX_TRY(cast_options.range, measure_range(*again.source, run.ctx));
+  std::vector<std::string> names;
+  if (!o.no_images) {
+    const bool pattern = o.output.find('%') != std::string::npos;
+    if (!o.path.empty() && !pattern)
+      return bad_usage("-o " + o.output + ": a path needs a pattern such as frame-%04d.png");
+    for (size_t i = 0; i < cameras.size(); ++i) {
+      names.push_back(o.output);
+      if (pattern) {
+        VOX_TRY(names.back(), frame_name(o.output, i));
+      }
+      VOX_CHECK(check_image_output(names.back(), run.options.force));
     }
   }
-  const GridTransform transform(info);
+  if (!o.report.empty()) VOX_CHECK(check_output(o.report, run.options.force));
+
+  const int rays_a_side = o.aa.starts_with("ssaa:") ? o.aa[5] - '0' : 1;
+  CastOptions cast_options;
+  cast_options.width = o.width * rays_a_side;
+  cast_options.height = o.height * rays_a_side;
+  cast_options.traversal = o.traversal == "restart"    ? Traversal::restart
+                           : o.traversal == "baseline" ? Traversal::baseline
+                                                       : Traversal::path;
+  cast_options.level_of_detail = o.lod == "on";
   ShadeOptions shade_options;
   shade_options.phong = o.shade.find("phong") != std::string::npos;
   shade_options.ssao = o.shade.find("ssao") != std::string::npos;
   shade_options.depth_antialias = o.aa == "depth";
 
-  run.stage("render");
-  std::vector<double> ms;
-  uint64_t rays = 0;
-  Json frames = Json::array();
-  for (size_t i = 0; i < cameras.size(); ++i) {
-    VOX_TRY(const Frame frame, compressed ? cast(*compressed, cameras[i], cast_options, run.ctx)
-                                          : cast(*dense, cameras[i], cast_options, run.ctx));
-    ms.push_back(frame.seconds * 1000);
-    rays += frame.rays;
-    frames.push(json_of(frame));
-    if (images) {
-      VOX_TRY(const Picture picture,
-              shade(frame, cameras[i], transform.smallest_edge(), shade_options, run.ctx));
-      VOX_CHECK(write_picture(picture, pattern ? frame_name(o.output, i) : o.output, run));
-    }
-    run.ctx.progress(static_cast<double>(i + 1) / static_cast<double>(cameras.size()));
+  VOX_TRY(const Scene scene, open_scene(o.input, o, run));
+  std::optional<Scene> other;
+  if (!o.reference.empty()) {
+    VOX_TRY(other, open_scene(o.reference, o, run));
+    if (other->info.dims != scene.info.dims)
+      return bad_usage(fmt::format("--reference {}: {} x {} x {} voxels: expected as many as the input has",
+                                   o.reference, other->info.dims.x, other->info.dims.y, other->info.dims.z));
   }
-  const double total = std::accumulate(ms.begin(), ms.end(), 0.0);
+  const double edge = GridTransform(scene.info).smallest_edge();
+  const auto picture_of = [&](const Frame& frame, const Camera& from) -> Result<Image> {
+    VOX_TRY(Picture picture, shade(frame, from, edge, shade_options, run.ctx));
+    return image_of(rays_a_side > 1 ? downsample(picture, rays_a_side) : picture, run.ctx);
+  };
+
+  run.stage("render");
+  Costs costs, other_costs;
+  double rmse = 0, psnr = 0, ms_ssim = 0;
+  const double count = static_cast<double>(cameras.size());
+  for (size_t i = 0; i < cameras.size(); ++i) {
+    VOX_TRY(const Frame frame, scene.draw(cameras[i], cast_options, run.ctx));
+    Json json = Json::object();
+    std::optional<Image> picture;
+    if (!names.empty() || other) {
+      VOX_TRY(picture, picture_of(frame, cameras[i]));
+    }
+    if (!names.empty()) VOX_CHECK(write_image(names[i], *picture, run.options.force));
+    if (other) {
+      CastOptions dense_options = cast_options;
+      if (other->compressed && dense_options.traversal == Traversal::baseline)
+        dense_options.traversal = Traversal::path;
+      VOX_TRY(const Frame expected, other->draw(cameras[i], dense_options, run.ctx));
+      VOX_TRY(const Image reference, picture_of(expected, cameras[i]));
+      VOX_TRY(const ImageDiff diff, diff_images(reference, *picture, std::nullopt, run.ctx));
+      VOX_TRY(const Image a, luma(reference, run.ctx));
+      VOX_TRY(const Image b, luma(*picture, run.ctx));
+      VOX_TRY(const Ssim similarity, ssim(a, b, std::nullopt, run.ctx));
+      json.set("rmse", diff.rmse).set("psnr_db", diff.psnr_db).set("ms_ssim", similarity.ms_ssim);
+      rmse += diff.rmse / count, psnr += diff.psnr_db / count, ms_ssim += similarity.ms_ssim / count;
+      other_costs.add(expected, Json::object());
+    }
+    costs.add(frame, std::move(json));
+    run.ctx.progress(static_cast<double>(i + 1) / count);
+  }
+
+  const double average = costs.average(), speed = costs.mrays_per_s();
   Json json = Json::result();
   json.set("tool", run.tool).set("version", version_text()).set("input", o.input).set("device", "cpu");
   json.set("size", fmt::format("{}x{}", o.width, o.height))
       .set("mode", "surface")
-      .set("frames", std::move(frames));
-  json.set("ms_min", *std::min_element(ms.begin(), ms.end()))
-      .set("ms_avg", total / static_cast<double>(ms.size()));
-  json.set("ms_max", *std::max_element(ms.begin(), ms.end()));
-  json.set("mrays_per_s", static_cast<double>(rays) / 1e3 / std::max(total, 1e-9))
-      .set("threads", run.options.threads);
-  json.set("peak_rss_bytes", peak_rss_bytes());
+      .set("traversal", o.traversal);
+  costs.write(json);
+  if (other) {
+    Json reference = Json::object();
+    reference.set("input", o.reference);
+    json.set("speed_ratio", other_costs.average() / average);
+    other_costs.write(reference);
+    json.set("reference", std::move(reference));
+    json.set("rmse_avg", rmse).set("psnr_db_avg", psnr).set("ms_ssim_avg", ms_ssim);
+  }
+  json.set("threads", run.options.threads).set("peak_rss_bytes", peak_rss_bytes());
   if (!o.report.empty()) {
     VOX_TRY(auto out, OutputFile::create(o.report, run.options.force));
     VOX_CHECK(out->write(json.text()));
@@ -185,9 +269,9 @@ Result<int> work(const Options& o, Run& run) {
   }
   if (run.options.json) VOX_CHECK(print(json.text()));
   if (!run.options.quiet && !run.options.json)
-    fmt::print(stderr, "{}: {} frames of {}x{}, {:.3g} ms a frame, {:.3g} million rays a second\n", o.input,
-               ms.size(), o.width, o.height, total / static_cast<double>(ms.size()),
-               static_cast<double>(rays) / 1e3 / std::max(total, 1e-9));
+    fmt::print(stderr, "{}: {} frames of {}x{}, {:.3g} ms a frame, {:.3g} million rays a second{}\n", o.input,
+               cameras.size(), o.width, o.height, average, speed,
+               other ? fmt::format("; {} dB, MS-SSIM {:.6f}", readable(psnr), ms_ssim) : "");
   return 0;
 }
 
@@ -201,6 +285,7 @@ int main(int argc, char** argv) {
       argc, argv, "vox-render", "Renders volumes, straight from the compressed form.",
       "  vox-render menger:4 -o sponge.png\n"
       "  vox-render scan.svmm -o scan.png --camera orbit:120,30,1.6 --size 1920x1080 --shade phong+ssao\n"
+      "  vox-render scan.svmm -o scan.png --reference scan.nrrd\n"
       "  vox-render scan.svmm --path thesis94 --no-images --report cost.json\n",
       [&](CommandLine& line) { declare(line, options); }, [&](Run& run) { return work(options, run); });
 }
