@@ -1,10 +1,10 @@
 #!/usr/bin/env python3
-"""Prints the results of scripts/demo as one table: demo_table.py RESULT... reads RESULT.{encode,decode,diff}.json."""
+"""Prints the results of scripts/demo as one table: demo_table.py RESULT... reads RESULT.{encode,decode,diff,render}.json."""
 import json
 import sys
 
 COLUMNS = ("input", "quality", "bytes", "percent", "bits/voxel", "PSNR dB", "greatest error", "encode MB/s",
-           "decode Mvoxel/s")
+           "decode Mvoxel/s", "render ms", "MS-SSIM")
 
 
 def load(result, step):
@@ -14,10 +14,12 @@ def load(result, step):
 
 def row(result):
     encode, decode, diff = (load(result, step) for step in ("encode", "decode", "diff"))
+    render = load(result, "render")
     x, y, z = encode["dims"]
     return (encode["input"], f"{encode['params']['quality']:g}", f"{encode['file_bytes']}", f"{encode['percent']:.1f}",
             f"{encode['bits_per_voxel']:.2f}", f"{float(diff['psnr_db']):.2f}", f"{diff['max_abs_error']:g}",
-            f"{encode['input_mb_per_s']:.0f}", f"{x * y * z / 1e6 / decode['decode_seconds']:.0f}")
+            f"{encode['input_mb_per_s']:.0f}", f"{x * y * z / 1e6 / decode['decode_seconds']:.0f}",
+            f"{render['ms_avg']:.0f}", f"{render['ms_ssim_avg']:.5f}")
 
 
 rows = [COLUMNS] + [row(result) for result in sys.argv[1:]]
