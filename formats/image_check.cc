@@ -94,6 +94,27 @@ Status check_png(const std::string& path) {
   return bad_input(path, fmt::format("PNG file ends after {} bytes: expected further chunks", bytes.size()));
 }
 
+Status check_jpeg(const std::string& path) {
+  VOX_TRY(const auto file, MappedFile::open(path));
+  const auto bytes = file->bytes();
+  const auto byte = [&](size_t at) { return std::to_integer<unsigned>(bytes[at]); };
+  if (bytes.size() < 2 || byte(0) != 0xff || byte(1) != 0xd8)
+    return bad_input(path, "not a JPEG file: expected its mark at byte 0");
+  const auto no_data = [](unsigned marker) { return marker <= 1 || (marker >= 0xd0 && marker <= 0xd7); };
+  // A segment: 0xff, a marker, and for most a length and data. Between segments there is coded data, where
+  // 0xff is followed by 0 or by a marker without data.
+  for (size_t at = 2; bytes.size() - at >= 2; ++at) {
+    const unsigned marker = byte(at + 1);
+    if (byte(at) != 0xff || marker == 0xff || no_data(marker)) continue;
+    if (marker == 0xd9) return {};
+    if (bytes.size() - at < 4) break;
+    const size_t length = byte(at + 2) << 8 | byte(at + 3);
+    if (length > bytes.size() - at - 2) break;
+    at += length + 1;
+  }
+  return bad_input(path, fmt::format("JPEG file ends after {} bytes: expected its end mark", bytes.size()));
+}
+
 Status check_exr(const std::string& path) {
   VOX_TRY(const auto file, MappedFile::open(path));
   const auto bytes = file->bytes();

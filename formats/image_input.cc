@@ -58,6 +58,7 @@ Result<std::unique_ptr<ImageInput>> open_image(const std::string& path, uint64_t
     return bad_input(path, fmt::format("cannot open: {}", std::generic_category().message(errno)));
   if (!S_ISREG(state.st_mode)) return bad_input(path, "not a regular file");
   if (std::string_view(format) == "png") VOX_CHECK(check_png(path));
+  if (std::string_view(format) == "jpeg") VOX_CHECK(check_jpeg(path));
   if (std::string_view(format) == "openexr") VOX_CHECK(check_exr(path));
   auto input = ImageInput::create(format);
   if (!input) return bad_input(path, fmt::format("OpenImageIO was built without {}", format));

@@ -1,9 +1,16 @@
-// voxdiff: how far one volume is from another.
+// voxdiff: how far one volume or image is from another.
 #include <fmt/core.h>
 
+#include <algorithm>
+#include <filesystem>
 #include <limits>
+#include <vector>
 
+#include "formats/image.h"
 #include "formats/open_volume.h"
+#include "libmetrics/colour_distance.h"
+#include "libmetrics/image_diff.h"
+#include "libmetrics/ssim.h"
 #include "libmetrics/volume_diff.h"
 #include "tools/common/input.h"
 #include "tools/common/json.h"
@@ -17,21 +24,25 @@ constexpr double largest = std::numeric_limits<double>::max();
 struct Options {
   std::string a, b, errors;
   OpenOptions open;
-  std::optional<double> fail_psnr, fail_max, peak;
+  std::string space = "srgb";  ///< of colour distances; lab adds CIELAB
+  std::optional<double> fail_psnr, fail_max, fail_ms_ssim, peak;
 };
 
 void declare(CommandLine& line, Options& o) {
-  line.argument("A", "The reference: a volume, a compressed volume, or -", o.a);
+  line.argument("A", "The reference: a volume, a compressed volume, an image, or -", o.a);
   line.argument("B", "What is compared with it", o.b);
   line.option("--fail-psnr", "DB", "Exit 1 if the PSNR is below", number(o.fail_psnr, -largest, largest));
   line.option("--fail-max", "E", "Exit 1 if an absolute error is above", number(o.fail_max, 0, largest));
-  line.option("--peak", "P", "Peak of the PSNR (default: full scale of A's format)",
+  line.option("--fail-ms-ssim", "S", "Images: exit 1 if the MS-SSIM is below", number(o.fail_ms_ssim, 0, 1));
+  line.option("--space", "srgb|lab", "Images: lab adds differences in CIELAB (CIE 1976; default: srgb)",
+              one_of(o.space, {"srgb", "lab"}));
+  line.option("--peak", "P", "Peak of PSNR and SSIM (default: full scale of A's format)",
               [&o](const std::string& text) -> Status {
                 VOX_TRY(o.peak, read_number(text, -largest, largest));
                 return *o.peak > 0 ? Status{}
                                    : bad_usage("\"" + text + "\": expected a number greater than 0");
               });
-  line.text("-o,--output", "ERR", "Write the absolute errors as a volume", o.errors);
+  line.text("-o,--output", "ERR", "Write the absolute errors as a volume or an image", o.errors);
   declare_input_options(line, o.open);
 }
 
@@ -67,14 +78,9 @@ std::string readable_lines(const VolumeDiff& d) {
   return text;
 }
 
-Result<int> work(const Options& o, Run& run) {
-  if (o.a == "-" && o.b == "-") return bad_usage("A and B are both standard input: expected one - at most");
-  if (!o.errors.empty()) {
-    if (o.errors == "-") return bad_usage("the error volume cannot go to standard output: expected a file");
-    VOX_CHECK(check_distinct(o.a, o.errors));
-    VOX_CHECK(check_distinct(o.b, o.errors));
-    VOX_CHECK(check_volume_output(o.errors, run.options.force));
-  }
+Result<int> compare_volumes(const Options& o, Run& run) {
+  if (o.fail_ms_ssim) return bad_usage("--fail-ms-ssim is for images: A and B are volumes");
+  if (o.space != "srgb") return bad_usage("--space lab is for images: A and B are volumes");
   VOX_TRY(const Input a, open_input(o.a, o.open, run.ctx));
   VOX_TRY(const Input b, open_input(o.b, o.open, run.ctx));
   const VolumeInfo& info_a = a.source->info();
@@ -110,6 +116,135 @@ Result<int> work(const Options& o, Run& run) {
   return passed ? 0 : 1;
 }
 
+struct ImageResult {
+  ImageDiff diff;
+  Ssim ssim;                       ///< of the luma
+  std::vector<Ssim> channel_ssim;  ///< colours
+  std::optional<LabDiff> lab;
+};
+
+Result<ImageResult> measure(const Image& a, const Image& b, const Options& o, Run& run) {
+  ImageResult result;
+  VOX_TRY(result.diff, diff_images(a, b, o.peak, run.ctx));
+  {
+    VOX_TRY(const Image luma_a, luma(a, run.ctx));
+    VOX_TRY(const Image luma_b, luma(b, run.ctx));
+    VOX_TRY(result.ssim, ssim(luma_a, luma_b, o.peak, run.ctx));
+  }
+  // Four times the work, so only where it is shown.
+  for (int c = 0; run.options.json && a.colours() > 1 && c < std::min(a.channels(), b.channels()); ++c) {
+    VOX_TRY(const Image channel_a, channel(a, c, run.ctx));
+    VOX_TRY(const Image channel_b, channel(b, c, run.ctx));
+    VOX_TRY(const Ssim one, ssim(channel_a, channel_b, o.peak, run.ctx));
+    result.channel_ssim.push_back(one);
+  }
+  if (o.space == "lab") {
+    VOX_TRY(result.lab, diff_lab(a, b, run.ctx));
+  }
+  return result;
+}
+
+Json describe(const ImageResult& r, const Run& run, const Options& o, bool passed) {
+  const ImageDiff& d = r.diff;
+  Json json = Json::result();
+  json.set("tool", run.tool).set("version", version_text()).set("a", o.a).set("b", o.b);
+  json.set("width", d.width).set("height", d.height).set("channels", d.channels).set("peak", d.peak);
+  json.set("mse", d.mse).set("rmse", d.rmse).set("psnr_db", d.psnr_db);
+  json.set("ssim", r.ssim.ssim).set("ms_ssim", r.ssim.ms_ssim).set("ms_ssim_scales", r.ssim.scales);
+  if (!r.channel_ssim.empty()) {
+    Json ssims = Json::array(), ms_ssims = Json::array();
+    for (const Ssim& s : r.channel_ssim) {
+      ssims.push(s.ssim);
+      ms_ssims.push(s.ms_ssim);
+    }
+    json.set("ssim_channels", std::move(ssims)).set("ms_ssim_channels", std::move(ms_ssims));
+  }
+  json.set("max_abs_error", d.max_abs_error).set("differing_pixels", d.differing_pixels);
+  if (d.grmse) json.set("grmse", *d.grmse).set("grmse_distance", *d.grmse_distance);
+  if (r.lab) json.set("delta_e_mean", r.lab->mean_delta_e).set("delta_e_max", r.lab->max_delta_e);
+  json.set("passed", passed);
+  return json;
+}
+
+std::string readable_lines(const ImageResult& r) {
+  const ImageDiff& d = r.diff;
+  std::string text = fmt::format("pixels            {} x {}, {} channel{}\n", d.width, d.height, d.channels,
+                                 d.channels == 1 ? "" : "s");
+  text += fmt::format("differing pixels  {} ({:.4g} %)\n", d.differing_pixels,
+                      100 * static_cast<double>(d.differing_pixels) /
+                          (static_cast<double>(d.width) * static_cast<double>(d.height)));
+  text += fmt::format("PSNR              {} dB (peak {})\n", readable(d.psnr_db), readable(d.peak));
+  text += fmt::format("SSIM              {}\n", readable(r.ssim.ssim));
+  text += fmt::format("MS-SSIM           {} ({} scale{})\n", readable(r.ssim.ms_ssim), r.ssim.scales,
+                      r.ssim.scales == 1 ? "" : "s");
+  text += fmt::format("RMSE              {}\n", readable(d.rmse));
+  text += fmt::format("absolute error    greatest {}\n", readable(d.max_abs_error));
+  if (d.grmse)
+    text += fmt::format("RGB RMSE          {} a channel, {} as a distance\n", readable(*d.grmse),
+                        readable(*d.grmse_distance));
+  if (r.lab)
+    text += fmt::format("delta E (1976)    mean {}, greatest {}\n", readable(r.lab->mean_delta_e),
+                        readable(r.lab->max_delta_e));
+  return text;
+}
+
+Result<int> compare_images(const Image& a, const Image& b, const Options& o, Run& run) {
+  if (!o.errors.empty() && !is_image_name(o.errors))
+    return bad_usage("-o " + o.errors + ": the errors of images are an image: expected .png, .tif or .exr");
+  if (a.width() != b.width() || a.height() != b.height()) {
+    if (run.options.json) {
+      Json json = Json::result();
+      json.set("tool", run.tool).set("version", version_text()).set("a", o.a).set("b", o.b);
+      json.set("width", a.width()).set("height", a.height());
+      json.set("width_b", b.width()).set("height_b", b.height()).set("passed", false);
+      VOX_CHECK(print(json.text()));
+    }
+    fmt::print(stderr, "{}: {}: has {} x {} pixels: expected {} x {}, as {}\n", run.tool, o.b, b.width(),
+               b.height(), a.width(), a.height(), o.a);
+    return 1;
+  }
+  run.stage("compare");
+  VOX_TRY(const ImageResult r, measure(a, b, o, run));
+  if (!o.errors.empty()) {
+    VOX_TRY(const Image errors, error_image(a, b, run.ctx));
+    VOX_CHECK(write_image(o.errors, errors, run.options.force));
+  }
+
+  const bool tolerant = o.fail_psnr || o.fail_max || o.fail_ms_ssim;
+  const bool passed = tolerant ? !(o.fail_psnr && !(r.diff.psnr_db >= *o.fail_psnr)) &&
+                                     !(o.fail_max && !(r.diff.max_abs_error <= *o.fail_max)) &&
+                                     !(o.fail_ms_ssim && !(r.ssim.ms_ssim >= *o.fail_ms_ssim))
+                               : r.diff.differing_pixels == 0;
+  if (run.options.json) {
+    VOX_CHECK(print(describe(r, run, o, passed).text()));
+  } else if (!run.options.quiet) {
+    VOX_CHECK(print(readable_lines(r)));
+  }
+  return passed ? 0 : 1;
+}
+
+bool is_image_file(const std::string& name) {
+  std::error_code ignored;
+  return is_image_name(name) && std::filesystem::is_regular_file(name, ignored);
+}
+
+Result<int> work(const Options& o, Run& run) {
+  if (o.a == "-" && o.b == "-") return bad_usage("A and B are both standard input: expected one - at most");
+  if (!o.errors.empty()) {
+    if (o.errors == "-") return bad_usage("the errors cannot go to standard output: expected a file");
+    VOX_CHECK(check_distinct(o.a, o.errors));
+    VOX_CHECK(check_distinct(o.b, o.errors));
+    VOX_CHECK(is_image_name(o.errors) ? check_image_output(o.errors, run.options.force)
+                                      : check_volume_output(o.errors, run.options.force));
+  }
+  if (is_image_file(o.a) && is_image_file(o.b)) {
+    VOX_TRY(const auto a, read_image(o.a, run.ctx));
+    VOX_TRY(const auto b, read_image(o.b, run.ctx));
+    if (a && b) return compare_images(*a, *b, o, run);
+  }
+  return compare_volumes(o, run);
+}
+
 }  // namespace
 }  // namespace voxkit::cli
 
@@ -118,10 +253,11 @@ int main(int argc, char** argv) {
   Options options;
   return run_tool(
       argc, argv, "voxdiff",
-      "Compares two volumes. Exits 1 if any voxel differs, or with --fail options only if one of those is "
-      "violated.",
+      "Compares two volumes or images. Exits 1 if anything differs, or with --fail options only if one of "
+      "those is violated.",
       "  voxdiff head.nrrd head.svmm\n"
       "  voxdiff head.nrrd head.svmm --json --fail-psnr 40 --fail-max 12\n"
-      "  voxdiff a.nrrd b.nrrd -o errors.nrrd\n",
+      "  voxdiff a.nrrd b.nrrd -o errors.nrrd\n"
+      "  voxdiff a.png b.png --fail-ms-ssim 0.98 --space lab -o errors.png\n",
       [&](CommandLine& line) { declare(line, options); }, [&](Run& run) { return work(options, run); });
 }
