@@ -266,21 +266,24 @@ class Encoder {
     scratch.resize(static_cast<size_t>(w0) * static_cast<size_t>(w0) * static_cast<size_t>(w0) *
                    voxel_bytes(F));
     NodeGrid<F>* nodes = &(tile_level_ == 0 ? tile.nodes : grids[0]);
-    nodes->reset(Index3(edge / w0));
+    nodes->resize(Index3(edge / w0));
     for_each_block(nodes->size, [&](Index3 b) {
       const Index3 at = b * int64_t{w0}, valid = min3(Index3(w0), box.size() - at);
-      if (valid.x <= 0 || valid.y <= 0 || valid.z <= 0) return;
+      if (valid.x <= 0 || valid.y <= 0 || valid.z <= 0) {
+        nodes->at(b) = {};
+        return;
+      }
       const ConstVoxelSpan block{in.row(at.y, at.z) + at.x * voxel_bytes(F), in.row_stride, in.slice_stride};
-      nodes->at(b) = encode_base_block<F>(block, valid, w0, params_, criterion_, scratch, tile.levels[0]);
+      encode_base_block<F>(block, valid, w0, params_, criterion_, scratch, tile.levels[0], nodes->at(b));
     });
     for (size_t k = 1; k <= tile_level_; ++k) {
       const int w = static_cast<int>(levels_[k].blockwidth);
       const Index3 level_size =
           min3(nodes->size, levels_[k].dims - lo / Index3(static_cast<int64_t>(levels_[k].mip_factor)));
       NodeGrid<F>* parents = &(k == tile_level_ ? tile.nodes : grids[k % 2]);
-      parents->reset(nodes->size / Index3(w));
+      parents->resize(nodes->size / Index3(w));
       for_each_block(parents->size, [&](Index3 b) {
-        parents->at(b) = encode_block(*nodes, b * int64_t{w}, level_size, w, criterion_, tile.levels[k]);
+        encode_block(*nodes, b * int64_t{w}, level_size, w, criterion_, tile.levels[k], parents->at(b));
       });
       nodes = parents;
     }
@@ -365,8 +368,8 @@ class Encoder {
       for (int64_t x = 0; x < parent_dims.x; x += 2)
         for (int i = 0; i < 8; ++i) {
           const Index3 b{x + (i & 1), 2 * row + (i >> 1 & 1), i >> 2};
-          parents.at(b) = encode_block(slab, b * w, slab.size, static_cast<int>(w), criterion_,
-                                       results[static_cast<size_t>(row)]);
+          encode_block(slab, b * w, slab.size, static_cast<int>(w), criterion_,
+                       results[static_cast<size_t>(row)], parents.at(b));
         }
       return Status{};
     }));

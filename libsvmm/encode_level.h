@@ -33,9 +33,15 @@ struct NodeGrid {
   Index3 size{0};
   std::vector<Node<F>> nodes;
 
+  /// All nodes outside the volume.
   void reset(Index3 new_size) {
+    resize(new_size);
+    std::fill(nodes.begin(), nodes.end(), Node<F>{});
+  }
+  /// For a caller who sets every node.
+  void resize(Index3 new_size) {
     size = new_size;
-    nodes.assign(static_cast<size_t>(size.x * size.y * size.z), {});
+    nodes.resize(static_cast<size_t>(size.x * size.y * size.z));
   }
   Node<F>& at(Index3 v) { return nodes[static_cast<size_t>((v.z * size.y + v.y) * size.x + v.x)]; }
   const Node<F>* find(Index3 v) const {
@@ -86,14 +92,14 @@ uint64_t write_structural_block(const NodeGrid<F>& grid, Index3 lo, Index3 size,
 void relocate_links(std::byte* blocks, uint64_t count, Index3 size, VoxelFormat f, Layout layout,
                     uint64_t base);
 
-/// Encodes the block of w^3 nodes at `lo` of level >= 1 and returns its equivalent voxel. `level_size` is
-/// what the grid can hold of the level, whose sides are rounded up to even: layout thesis takes nodes within
-/// it, but outside the volume, for void voxels that must be near enough as well (the published sizes say so);
-/// their weight in averages is zero all the same.
+/// Encodes the block of w^3 nodes at `lo` of level >= 1 and sets its equivalent voxel, `parent`. `level_size`
+/// is what the grid can hold of the level, whose sides are rounded up to even: layout thesis takes nodes
+/// within it, but outside the volume, for void voxels that must be near enough as well (the published sizes
+/// say so); their weight in averages is zero all the same.
 template <VoxelFormat F>
-Node<F> encode_block(const NodeGrid<F>& grid, const Index3& lo, const Index3& level_size, int w,
-                     const Criterion& criterion, BlockBuffer& out) {
-  Node<F> parent;
+void encode_block(const NodeGrid<F>& grid, const Index3& lo, const Index3& level_size, int w,
+                  const Criterion& criterion, BlockBuffer& out, Node<F>& parent) {
+  parent = {};
   bool all_terminal = true, padding = false;
   const Index3 hi{std::min(lo.x + w, level_size.x), std::min(lo.y + w, level_size.y),
                   std::min(lo.z + w, level_size.z)};
@@ -106,7 +112,7 @@ Node<F> encode_block(const NodeGrid<F>& grid, const Index3& lo, const Index3& le
         parent.moments.add(node.moments);
         all_terminal &= node.terminal;
       }
-  if (parent.moments.count == 0) return parent;
+  if (parent.moments.count == 0) return;
   parent.value = parent.moments.value(criterion);
   bool homogeneous = all_terminal && (!criterion.global || parent.moments.within(parent.value, criterion));
   if (padding && criterion.layout == Layout::thesis)
@@ -120,11 +126,10 @@ Node<F> encode_block(const NodeGrid<F>& grid, const Index3& lo, const Index3& le
           homogeneous =
               node.moments.count == 0 || Moments<F>::near(decoded.bytes.data(), parent.value, criterion);
         }
-  if (homogeneous) return parent;
+  if (homogeneous) return;
   parent.terminal = false;
   parent.block = out.blocks++;
   out.terminal_voxels += write_structural_block(grid, lo, Index3(w), criterion.layout, out.bytes);
-  return parent;
 }
 
 /// Copies the voxels of a block of extent `size`, of which `valid` lie inside the volume, to block order; the
@@ -161,8 +166,9 @@ bool all_equal(const std::byte* voxels, int64_t n) {
 /// Encodes the block of w^3 voxels of the base level at `voxels`, of which `valid` lie inside the volume (at
 /// least one), and returns its equivalent voxel. `scratch` holds w^3 voxels.
 template <VoxelFormat F>
-Node<F> encode_base_block(const ConstVoxelSpan& voxels, const Index3& valid, int w, const Params& params,
-                          const Criterion& criterion, std::vector<std::byte>& scratch, BlockBuffer& out) {
+void encode_base_block(const ConstVoxelSpan& voxels, const Index3& valid, int w, const Params& params,
+                       const Criterion& criterion, std::vector<std::byte>& scratch, BlockBuffer& out,
+                       Node<F>& parent) {
   constexpr int bytes = voxel_bytes(F);
   const Index3 size(w);
   const int64_t count = valid.x * valid.y * valid.z, all = size.x * size.y * size.z;
@@ -182,29 +188,30 @@ Node<F> encode_base_block(const ConstVoxelSpan& voxels, const Index3& valid, int
     return true;
   };
 
-  Node<F> parent;
+  Moments<F> moments;  // a local, not parent's: it can stay in registers
   if (count == all && all_equal<bytes>(block, all)) {
     Voxel v;
     std::memcpy(v.bytes.data(), block, bytes);
-    parent.moments.add_uniform(v, static_cast<uint64_t>(count), criterion);
+    moments.add_uniform(v, static_cast<uint64_t>(count), criterion);
   } else if (count == all) {
-    parent.moments.add(block, all, criterion);
+    moments.add(block, all, criterion);
   } else {
     every([&](const std::byte* v) {
-      parent.moments.add(v, 1, criterion);
+      moments.add(v, 1, criterion);
       return true;
     });
   }
-  parent.value = parent.moments.value(criterion);
-  bool homogeneous = parent.moments.within(parent.value, criterion);
+  const Voxel value = moments.value(criterion);
+  parent.moments = moments;
+  parent.value = value;
+  bool homogeneous = moments.within(value, criterion);
   if (!homogeneous && is_colour(F))  // the box of values is too wide, but perhaps no voxel is in its corner
-    homogeneous = every([&](const std::byte* v) { return Moments<F>::near(v, parent.value, criterion); });
-  if (homogeneous) return parent;
-  parent.terminal = false;
+    homogeneous = every([&](const std::byte* v) { return Moments<F>::near(v, value, criterion); });
+  parent.terminal = homogeneous;
+  if (homogeneous) return;
   parent.block = out.blocks++;
   out.terminal_voxels += static_cast<uint64_t>(count);
   encode_base_block(block, size, F, params.base, params.layout, out.bytes);
-  return parent;
 }
 
 }  // namespace voxkit::svmm
