@@ -78,8 +78,8 @@ Result<std::optional<Image>> read_image(const std::string& path, Context& ctx) {
 }
 
 Status write_image(const std::string& path, const Image& image, bool force) {
-  auto table = load_module(module_folder(),
-                           {"image_stack", "writing images", "libopenimageio-dev", ErrorCode::usage});
+  auto table =
+      load_module(module_folder(), {"image_stack", "writing images", "libopenimageio-dev", ErrorCode::usage});
   if (!table) return fail(table.error().code, path, table.error().what);
   return (*table)->write_image(path, image, force);
 }

@@ -191,6 +191,18 @@ TEST_F(SsimTest, EqualImagesAreOneExactly) {
   EXPECT_EQ(measure(huge, huge).ms_ssim, 1);
 }
 
+TEST_F(SsimTest, StaysInItsRangeWhereRoundingIsLargerThanTheVariance) {
+  for (const double value : {1e15, 1.7e15, 3e20}) {
+    const auto flat = [&](double factor) {
+      return picture(180, 180, 1, SampleType::f32, ctx_,
+                     [&](int64_t, int64_t, int) { return value * factor; });
+    };
+    const Ssim got = measure(flat(1), flat(1.37));
+    EXPECT_LE(std::abs(got.ssim), 1) << value;
+    EXPECT_LE(got.ms_ssim, 1) << value;
+  }
+}
+
 TEST_F(SsimTest, NegativeTermsCountAsZero) {
   const Image a = noise(200, 200, 4);
   const Image b = picture(200, 200, 1, SampleType::u8, ctx_,
