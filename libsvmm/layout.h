@@ -111,10 +111,10 @@ struct StructuralBlock {
   Voxel value(int64_t voxel) const {
     if (layout == Layout::thesis)
       return thesis_value(load_word(bytes + voxel * word_bytes(format), format), format);
-    Voxel v;
-    std::memcpy(v.bytes.data(), bytes + voxel * value_bytes(format),
-                static_cast<size_t>(value_bytes(format)));
-    return v;
+    // Four bytes are always there, since the links follow: one load, where a copy of 1 to 4 bytes would be a
+    // loop.
+    const uint32_t four = load_le<uint32_t>(bytes + voxel * value_bytes(format));
+    return Voxel::of(four & (~uint32_t{0} >> (32 - 8 * value_bytes(format))));
   }
 
  private:
