@@ -12,6 +12,7 @@
 
 #include "formats/copy.h"
 #include "formats/full_scale.h"
+#include "formats/little_endian.h"
 #include "formats/parallel.h"
 
 namespace voxkit {
@@ -49,17 +50,6 @@ struct Sums {
     differing += s.differing * times;
   }
 };
-
-template <class T>
-T load(const std::byte* p) {
-  T value;
-  std::memcpy(&value, p, sizeof value);
-  return value;
-}
-template <class T>
-void store(std::byte* p, T value) {
-  std::memcpy(p, &value, sizeof value);
-}
 
 /// Compares rows of voxels. `errors` may be null.
 class Comparison {
@@ -106,8 +96,8 @@ class Comparison {
       int32_t lo = std::numeric_limits<int32_t>::max(), hi = std::numeric_limits<int32_t>::min();
       const int32_t bias_a = bias_a_, bias_b = bias_b_;
       for (int64_t i = 0; i < n; ++i) {
-        const int32_t va = load<A>(a + i * static_cast<int64_t>(sizeof(A))) - bias_a;
-        const int32_t vb = load<B>(b + i * static_cast<int64_t>(sizeof(B))) - bias_b;
+        const int32_t va = load_le<A>(a + i * static_cast<int64_t>(sizeof(A))) - bias_a;
+        const int32_t vb = load_le<B>(b + i * static_cast<int64_t>(sizeof(B))) - bias_b;
         const uint32_t d = static_cast<uint32_t>(va < vb ? vb - va : va - vb);
         squares += uint64_t{d} * d;
         absolute += d;
@@ -126,19 +116,19 @@ class Comparison {
       sums.merge(part);
       if (errors != nullptr) {
         for (int64_t i = 0; i < n; ++i) {
-          const int32_t va = load<A>(a + i * static_cast<int64_t>(sizeof(A))) - bias_a;
-          const int32_t vb = load<B>(b + i * static_cast<int64_t>(sizeof(B))) - bias_b;
+          const int32_t va = load_le<A>(a + i * static_cast<int64_t>(sizeof(A))) - bias_a;
+          const int32_t vb = load_le<B>(b + i * static_cast<int64_t>(sizeof(B))) - bias_b;
           if (error_ == VoxelFormat::float32)
-            store(errors + 4 * i, static_cast<float>(std::abs(va - vb)));
+            store_le(errors + 4 * i, static_cast<float>(std::abs(va - vb)));
           else
-            store(errors + i * static_cast<int64_t>(sizeof(A)), static_cast<A>(std::abs(va - vb)));
+            store_le(errors + i * static_cast<int64_t>(sizeof(A)), static_cast<A>(std::abs(va - vb)));
         }
       }
     } else {
       Sums part;
       for (int64_t i = 0; i < n; ++i) {
-        const A stored_a = load<A>(a + i * static_cast<int64_t>(sizeof(A)));
-        const B stored_b = load<B>(b + i * static_cast<int64_t>(sizeof(B)));
+        const A stored_a = load_le<A>(a + i * static_cast<int64_t>(sizeof(A)));
+        const B stored_b = load_le<B>(b + i * static_cast<int64_t>(sizeof(B)));
         const double va = static_cast<double>(stored_a) - bias_a_,
                      vb = static_cast<double>(stored_b) - bias_b_;
         double d = va == vb ? 0 : std::abs(va - vb);
@@ -155,7 +145,7 @@ class Comparison {
         else
           part.differing += d != 0;
         part.greatest = std::max(part.greatest, d);
-        if (errors != nullptr) store(errors + 4 * i, static_cast<float>(d));
+        if (errors != nullptr) store_le(errors + 4 * i, static_cast<float>(d));
       }
       sums.merge(part);
     }

@@ -12,6 +12,7 @@
 #include "libsvmm/svmm.h"
 #include "tools/common/input.h"
 #include "tools/common/main.h"
+#include "tools/common/retype.h"
 #include "tools/common/svmm_report.h"
 
 namespace voxkit::cli {
@@ -54,15 +55,8 @@ void declare(CommandLine& line, Options& o) {
       one_of(o.bound, {"local", "global"}));
   line.option("--alpha-weight", "on|off", "Weigh colours by alpha in averages (on; thesis: off)",
               one_of(o.alpha_weight, {"on", "off"}));
-  line.option("--range", "LO,HI",
-              "Sample values of 16 bit and float volumes that are full scale (default: measured)",
-              [&o](const std::string& text) -> Status {
-                VOX_TRY(const auto ends, read_numbers(text, 2));
-                if (!(ends[0] < ends[1]))
-                  return bad_usage("\"" + text + "\": expected LO,HI with LO less than HI");
-                o.range = ValueRange{ends[0], ends[1]};
-                return {};
-              });
+  declare_range_option(line, o.range,
+                       "Sample values of 16 bit and float volumes that are full scale (default: measured)");
   line.flag("--verify",
             "Decode and compare before the output appears; exit 1 if the promised bound is broken", o.verify);
   declare_input_options(line, o.open);

@@ -35,7 +35,8 @@ void declare(CommandLine& line, Options& o) {
               });
   line.option("--output-type", "TYPE", "Type of the output, whatever the input is",
               target_type(o.output_type));
-  declare_range_option(line, o.range);
+  declare_range_option(line, o.range,
+                       "Values that a narrower type's ends stand for (default: least and greatest value)");
   line.flag("--apply-scale", "Write real values (slope and intercept applied) as f32", o.apply_scale);
   line.option("--crop", "BOX", "X0,Y0,Z0,X1,Y1,Z1: part of the input, half open", box(o.crop));
   line.option("--resample", "X,Y,Z", "New extent, after --crop", dims(o.resample));

@@ -27,7 +27,8 @@ void declare(CommandLine& line, Options& o) {
               box(o.roi));
   line.option("--level", "N", "Stop at this mip level; 0: all detail", integer(o.level, 0, 64));
   line.option("--type", "TYPE", "Type of the output: u8 i8 u16 i16 f32 rgba8 bit", target_type(o.type));
-  declare_range_option(line, o.range);
+  declare_range_option(line, o.range,
+                       "Values that a narrower type's ends stand for (default: least and greatest value)");
 }
 
 Result<int> work(const Options& o, Run& run) {

@@ -105,9 +105,9 @@ std::string text_of(const Options& o, const Input& input, std::optional<uint64_t
                         8 * static_cast<double>(*bytes) / static_cast<double>(*checked_voxels(info.dims)));
   if (input.svmm) {
     const svmm::Params& p = input.svmm->params();
-    text +=
-        fmt::format("params      layout {}, base {}, bound {}, quality {:.6g}, delta {:.6g}, rootwidth {}\n",
-                    cli::name(p.layout), cli::name(p.base), cli::name(p.bound), p.quality, p.delta, p.rootwidth);
+    text += fmt::format(
+        "params      layout {}, base {}, bound {}, quality {:.6g}, delta {:.6g}, rootwidth {}\n",
+        cli::name(p.layout), cli::name(p.base), cli::name(p.bound), p.quality, p.delta, p.rootwidth);
     text += "level  width  factor  dims                    blocks  block bytes  terminal voxels\n";
     int index = 0;
     for (const svmm::Level& l : input.svmm->levels())

@@ -15,6 +15,7 @@
 #include "tools/common/input.h"
 #include "tools/common/json.h"
 #include "tools/common/main.h"
+#include "tools/common/retype.h"
 
 namespace voxkit::cli {
 namespace {
@@ -62,15 +63,8 @@ void declare(CommandLine& line, Options& o) {
               one_of(o.aa, {"none", "depth", "ssaa:2", "ssaa:3", "ssaa:4", "ssaa:8"}));
   line.option("--lod", "on|off", "Stop at voxels as small as a pixel (off)", one_of(o.lod, {"on", "off"}));
   line.option("--device", "DEVICE", "Where to render: cpu (cpu)", one_of(o.device, {"cpu", "cuda"}));
-  line.option("--range", "LO,HI",
-              "Sample values that are shown as 0 and 1 (default: full scale, or measured)",
-              [&o](const std::string& text) -> Status {
-                VOX_TRY(const auto ends, read_numbers(text, 2));
-                if (!(ends[0] < ends[1]))
-                  return bad_usage("\"" + text + "\": expected LO,HI with LO less than HI");
-                o.range = ValueRange{ends[0], ends[1]};
-                return {};
-              });
+  declare_range_option(line, o.range,
+                       "Sample values that are shown as 0 and 1 (default: full scale, or measured)");
   line.text("--reference", "INPUT2", "Render this as well, and report how far the pictures are apart",
             o.reference);
   line.text("--report", "OUT.json", "Write what every frame cost", o.report);

@@ -32,16 +32,13 @@ Result<std::unique_ptr<VolumeSource>> retyped(std::unique_ptr<VolumeSource> sour
   return convert_type(std::move(source), *type, stored, run.ctx);
 }
 
-void declare_range_option(CommandLine& line, std::optional<ValueRange>& range) {
-  line.option("--range", "LO,HI",
-              "Values that a narrower type's ends stand for (default: least and greatest value)",
-              [&range](const std::string& text) -> Status {
-                VOX_TRY(const auto ends, read_numbers(text, 2));
-                if (!(ends[0] < ends[1]))
-                  return bad_usage("\"" + text + "\": expected LO,HI with LO less than HI");
-                range = ValueRange{ends[0], ends[1]};
-                return {};
-              });
+void declare_range_option(CommandLine& line, std::optional<ValueRange>& range, const std::string& help) {
+  line.option("--range", "LO,HI", help, [&range](const std::string& text) -> Status {
+    VOX_TRY(const auto ends, read_numbers(text, 2));
+    if (!(ends[0] < ends[1])) return bad_usage("\"" + text + "\": expected LO,HI with LO less than HI");
+    range = ValueRange{ends[0], ends[1]};
+    return {};
+  });
 }
 
 }  // namespace voxkit::cli

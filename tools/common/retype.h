@@ -22,7 +22,7 @@ Result<std::unique_ptr<VolumeSource>> retyped(std::unique_ptr<VolumeSource> sour
                                               const std::optional<TargetType>& type,
                                               const std::optional<ValueRange>& range, Run& run);
 
-/// Declares --range.
-void declare_range_option(CommandLine& line, std::optional<ValueRange>& range);
+/// Declares --range: sample values LO,HI, for what `help` says.
+void declare_range_option(CommandLine& line, std::optional<ValueRange>& range, const std::string& help);
 
 }  // namespace voxkit::cli
