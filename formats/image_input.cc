@@ -72,10 +72,8 @@ Result<std::unique_ptr<ImageInput>> open_image(const std::string& path, uint64_t
     return bad_input(path, one_line(text));
   }
   if (spec.width < 1 || spec.height < 1) return bad_input(path, "image without pixels");
-  // Half floats are converted through a buffer of 256 rows, however few the image has.
-  const uint64_t bytes = spec.format == OIIO::TypeDesc::HALF
-                             ? std::max<uint64_t>(spec.image_bytes(), 256 * 2 * spec.scanline_bytes())
-                             : spec.image_bytes();
+  // The library reads through a buffer of 256 rows, however few the image has.
+  const uint64_t bytes = std::max<uint64_t>(spec.image_bytes(), 256 * uint64_t{spec.scanline_bytes()});
   if (spec.image_bytes() / 65536 > static_cast<uint64_t>(state.st_size) + 16)
     return bad_input(path, fmt::format("header says {}: a file of {} bytes cannot hold that", describe(spec),
                                        static_cast<int64_t>(state.st_size)));
