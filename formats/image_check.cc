@@ -115,7 +115,7 @@ Status check_jpeg(const std::string& path) {
   return bad_input(path, fmt::format("JPEG file ends after {} bytes: expected its end mark", bytes.size()));
 }
 
-Status check_exr(const std::string& path) {
+Status check_exr(const std::string& path, uint64_t memory_limit) {
   VOX_TRY(const auto file, MappedFile::open(path));
   const auto bytes = file->bytes();
   constexpr uint32_t magic = 20000630, many_parts = 0x1000;
@@ -127,11 +127,17 @@ Status check_exr(const std::string& path) {
   const auto broken = [&](const char* why) {
     return bad_input(path, fmt::format("corrupt OpenEXR file: header at byte {}: {}", at, why));
   };
+  uint64_t width = 0, channels = 1;
   // Attributes: name, type, size, value. An empty name ends a header; of many, an empty header the last.
   for (bool first = true;; first = false) {
     const size_t name_end = text.find('\0', at);
     if (name_end == text.npos) return broken("it leads past the end of the file");
     if (name_end == at) {
+      // OpenEXR takes buffers for whole chunks of rows when it opens a file.
+      if (unpacking_bytes(width * channels * 4) > memory_limit / 2)
+        return fail(ErrorCode::limit, path,
+                    fmt::format("rows of {} pixels take more than half of --max-memory, {}, to unpack", width,
+                                memory_limit));
       ++at;
       if (first || !parts || (at < text.size() && text[at] == '\0')) return {};
       continue;
@@ -145,6 +151,13 @@ Status check_exr(const std::string& path) {
     const std::string_view type = text.substr(name_end + 1, type_end - name_end - 1);
     if (!exr_value_fits(type, bytes.subspan(type_end + 5, static_cast<size_t>(size))))
       return broken("the value of an attribute is not of the size that the file says");
+    const std::byte* value = bytes.data() + type_end + 5;
+    if (type == "box2i" && text.substr(at, name_end - at) == "dataWindow") {
+      const int64_t extent = int64_t{load_le<int32_t>(value + 8)} - load_le<int32_t>(value) + 1;
+      width = static_cast<uint64_t>(std::max<int64_t>(extent, 0));
+    }
+    if (type == "chlist")
+      channels = static_cast<uint64_t>(size) / 18 + 1;  // a name of a letter or more, its end, 16 bytes
     at = type_end + 5 + static_cast<size_t>(size);
   }
 }

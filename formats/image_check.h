@@ -1,6 +1,7 @@
 // Whether PNG, JPEG and OpenEXR files are whole, before OpenImageIO opens them.
 #pragma once
 
+#include <cstdint>
 #include <string>
 
 #include "formats/result.h"
@@ -14,8 +15,15 @@ Status check_png(const std::string& path);
 /// Follows the segments of a JPEG file to its end. libjpeg fills up what a cut file lacks with grey.
 Status check_jpeg(const std::string& path);
 
+/// What the libraries take to unpack rows of that size, up to 256 at once, whatever the height of the image;
+/// 0 where that is too little to matter, below 64 MiB.
+constexpr uint64_t unpacking_bytes(uint64_t row_bytes) {
+  return row_bytes < (uint64_t{64} << 20) / 256 ? 0 : 256 * row_bytes;
+}
+
 /// Follows the attributes of an OpenEXR file's headers. OpenEXR allocates as much as an attribute's size
-/// says, up to 2 GiB.
-Status check_exr(const std::string& path);
+/// says, up to 2 GiB, and rows of the width that it says. ErrorCode::limit where these take over half of
+/// `memory_limit`.
+Status check_exr(const std::string& path, uint64_t memory_limit);
 
 }  // namespace voxkit

@@ -59,7 +59,7 @@ Result<std::unique_ptr<ImageInput>> open_image(const std::string& path, uint64_t
   if (!S_ISREG(state.st_mode)) return bad_input(path, "not a regular file");
   if (std::string_view(format) == "png") VOX_CHECK(check_png(path));
   if (std::string_view(format) == "jpeg") VOX_CHECK(check_jpeg(path));
-  if (std::string_view(format) == "openexr") VOX_CHECK(check_exr(path));
+  if (std::string_view(format) == "openexr") VOX_CHECK(check_exr(path, memory_limit));
   auto input = ImageInput::create(format);
   if (!input) return bad_input(path, fmt::format("OpenImageIO was built without {}", format));
   input->threads(1);  // callers decode slices side by side
@@ -73,7 +73,7 @@ Result<std::unique_ptr<ImageInput>> open_image(const std::string& path, uint64_t
   }
   if (spec.width < 1 || spec.height < 1) return bad_input(path, "image without pixels");
   // The library reads through a buffer of 256 rows, however few the image has.
-  const uint64_t bytes = std::max<uint64_t>(spec.image_bytes(), 256 * uint64_t{spec.scanline_bytes()});
+  const uint64_t bytes = std::max<uint64_t>(spec.image_bytes(), unpacking_bytes(spec.scanline_bytes()));
   if (spec.image_bytes() / 65536 > static_cast<uint64_t>(state.st_size) + 16)
     return bad_input(path, fmt::format("header says {}: a file of {} bytes cannot hold that", describe(spec),
                                        static_cast<int64_t>(state.st_size)));
