@@ -15,10 +15,11 @@ Status check_png(const std::string& path);
 /// Follows the segments of a JPEG file to its end. libjpeg fills up what a cut file lacks with grey.
 Status check_jpeg(const std::string& path);
 
-/// What the libraries take to unpack rows of that size, up to 256 at once, whatever the height of the image;
-/// 0 where that is too little to matter, below 64 MiB.
-constexpr uint64_t unpacking_bytes(uint64_t row_bytes) {
-  return row_bytes < (uint64_t{64} << 20) / 256 ? 0 : 256 * row_bytes;
+/// What the libraries take to unpack rows of that size, up to 256 or a whole strip at once, whatever the
+/// height of the image; 0 where that is too little to matter, below 64 MiB.
+constexpr uint64_t unpacking_bytes(uint64_t row_bytes, uint64_t strip_rows = 0) {
+  const uint64_t rows = strip_rows > 256 ? strip_rows : 256;
+  return row_bytes < (uint64_t{64} << 20) / rows ? 0 : rows * row_bytes;
 }
 
 /// Follows the attributes of an OpenEXR file's headers. OpenEXR allocates as much as an attribute's size

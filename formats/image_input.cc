@@ -72,8 +72,10 @@ Result<std::unique_ptr<ImageInput>> open_image(const std::string& path, uint64_t
     return bad_input(path, one_line(text));
   }
   if (spec.width < 1 || spec.height < 1) return bad_input(path, "image without pixels");
-  // The library reads through a buffer of 256 rows, however few the image has.
-  const uint64_t bytes = std::max<uint64_t>(spec.image_bytes(), unpacking_bytes(spec.scanline_bytes()));
+  // The library reads through a buffer of 256 rows, or of a TIFF strip, however few the image has.
+  const int strip = std::max(0, spec.get_int_attribute("tiff:RowsPerStrip"));
+  const uint64_t bytes = std::max<uint64_t>(
+      spec.image_bytes(), unpacking_bytes(spec.scanline_bytes(), static_cast<uint64_t>(strip)));
   if (spec.image_bytes() / 65536 > static_cast<uint64_t>(state.st_size) + 16)
     return bad_input(path, fmt::format("header says {}: a file of {} bytes cannot hold that", describe(spec),
                                        static_cast<int64_t>(state.st_size)));
