@@ -164,7 +164,7 @@ bool all_equal(const std::byte* voxels, int64_t n) {
 }
 
 /// Encodes the block of w^3 voxels of the base level at `voxels`, of which `valid` lie inside the volume (at
-/// least one), and returns its equivalent voxel. `scratch` holds w^3 voxels.
+/// least one), and sets its equivalent voxel, `parent`. `scratch` holds w^3 voxels.
 template <VoxelFormat F>
 void encode_base_block(const ConstVoxelSpan& voxels, const Index3& valid, int w, const Params& params,
                        const Criterion& criterion, std::vector<std::byte>& scratch, BlockBuffer& out,
