@@ -99,19 +99,31 @@ struct Contender {
   }
 };
 
+/// `cast`, whether it returns the frame or overwrites it.
+template <class Grid>
+Status cast_into(const Grid& grid, const Camera& camera, const CastOptions& options, Frame& frame,
+                 Context& ctx) {
+  if constexpr (requires { cast(grid, camera, options, frame, ctx); }) {
+    return cast(grid, camera, options, frame, ctx);
+  } else {
+    VOX_TRY(frame, cast(grid, camera, options, ctx));
+    return {};
+  }
+}
+
 std::vector<Contender> contenders(const Compressed& lossless, const Compressed& lossy,
                                   const std::shared_ptr<const NanovdbGrid>& peer, const Options& o,
                                   Context& ctx) {
   std::vector<Contender> all;
   const auto add_ours = [&](std::string name, const Compressed& compressed) {
-    const auto cast_frame = [grid = SvmmGrid(compressed.volume), &o, &ctx](const Camera& camera,
-                                                                           Voxels& voxels) -> Result<double> {
+    const auto cast_frame = [grid = SvmmGrid(compressed.volume), frame = std::make_shared<Frame>(), &o, &ctx](
+                                const Camera& camera, Voxels& voxels) -> Result<double> {
       CastOptions options;
       options.width = o.width;
       options.height = o.height;
-      VOX_TRY(const Frame frame, cast(grid, camera, options, ctx));
-      for (size_t i = 0; i < frame.pixels.size(); ++i) voxels[i] = std::to_array(frame.pixels[i].voxel);
-      return frame.seconds;
+      VOX_CHECK(cast_into(grid, camera, options, *frame, ctx));
+      for (size_t i = 0; i < frame->pixels.size(); ++i) voxels[i] = std::to_array(frame->pixels[i].voxel);
+      return frame->seconds;
     };
     all.push_back({std::move(name), compressed.bytes, cast_frame, {}, 0, 0});
   };
