@@ -4,6 +4,7 @@
 #include <cstdint>
 #include <memory>
 #include <optional>
+#include <span>
 #include <string>
 
 #include "formats/copy.h"
@@ -44,14 +45,25 @@ class Image {
 /// True for names that end like one image: .png .tif .tiff .exr .jpg .jpeg, and are no pattern of images.
 bool is_image_name(const std::string& name);
 
+/// Further channels of an OpenEXR file: "NAME.X" for each letter X of `channels`, which the image has one of
+/// for each. Its samples are floats.
+struct ImageLayer {
+  std::string name;
+  std::string channels;
+  Image image;
+};
+
 /// Reads a .png, .tif, .exr or .jpg file of 1 to 4 channels of 8 or 16 bit integers or floats; nothing where
-/// the file has several pages, which is a volume. Colours are as they are in the file, not multiplied by
-/// alpha. Errors: ErrorCode::input, ErrorCode::limit.
+/// the file has several pages, which is a volume. An OpenEXR file may have more: its R, G, B and A, or Y and
+/// A, are read, layers are not. Colours are as they are in the file, not multiplied by alpha. Errors:
+/// ErrorCode::input, ErrorCode::limit.
 Result<std::optional<Image>> read_image(const std::string& path, Context& ctx);
 
 /// Writes a .png, .tif or .exr file, whole or not at all. Integers are rounded and clamped to the image's
-/// type. Errors: ErrorCode::usage where such a file cannot hold the type, ErrorCode::output.
-Status write_image(const std::string& path, const Image& image, bool force);
+/// type. `layers`: of the image's size, for .exr only. Errors: ErrorCode::usage where such a file cannot hold
+/// the type or the layers, ErrorCode::output.
+Status write_image(const std::string& path, const Image& image, bool force,
+                   std::span<const ImageLayer> layers = {});
 
 /// The checks of `write_image` that need no image.
 Status check_image_output(const std::string& path, bool force);

@@ -9,6 +9,7 @@
 #include <limits>
 #include <new>
 #include <string_view>
+#include <utility>
 #include <vector>
 
 #include "formats/image_input.h"
@@ -22,8 +23,8 @@ using OIIO::ImageOutput;
 using OIIO::ImageSpec;
 using OIIO::TypeDesc;
 
-std::optional<SampleType> sample_type(const ImageSpec& spec) {
-  switch (spec.format.basetype) {
+std::optional<SampleType> sample_type(TypeDesc type) {
+  switch (type.basetype) {
     case TypeDesc::UINT8:
       return SampleType::u8;
     case TypeDesc::INT8:
@@ -102,6 +103,21 @@ void from_floats(const float* in, SampleType type, int64_t count, std::byte* out
   }
 }
 
+/// The channels that are the picture, first and count: in an OpenEXR file that has more those of no layer
+/// that are called R, G, B and A, or Y and A. The library puts them side by side in that order.
+std::pair<int, int> picture_channels(const ImageSpec& spec, std::string_view format) {
+  const auto& names = spec.channelnames;
+  if (format != "openexr") return {0, spec.nchannels};
+  for (const std::vector<std::string>& colours : {std::vector<std::string>{"R", "G", "B"}, {"Y"}}) {
+    const auto first = std::search(names.begin(), names.end(), colours.begin(), colours.end());
+    if (first == names.end()) continue;
+    const auto next = first + static_cast<ptrdiff_t>(colours.size());
+    return {static_cast<int>(first - names.begin()),
+            static_cast<int>(colours.size()) + (next != names.end() && *next == "A")};
+  }
+  return {0, spec.nchannels};
+}
+
 Result<std::optional<Image>> read(const std::string& path, Context& ctx) {
   limit_image_size(ctx);
   VOX_TRY(const auto input, open_image(path, ctx.memory->limit()));
@@ -110,12 +126,13 @@ Result<std::optional<Image>> read(const std::string& path, Context& ctx) {
     if (pages > 1) return std::nullopt;
   }
   const ImageSpec spec = input->spec();
-  const auto type = sample_type(spec);
-  if (!type || spec.deep || spec.depth > 1 || spec.nchannels < 1 || spec.nchannels > 4)
+  const auto [first, count] = picture_channels(spec, input->format_name());
+  const auto type = sample_type(spec.channelformat(first));
+  if (!type || spec.deep || spec.depth > 1 || count < 1 || count > 4)
     return bad_input(path,
                      fmt::format("image is {}: expected 1 to 4 channels of 8 or 16 bit integers or floats",
                                  describe(spec)));
-  VOX_TRY(Image image, Image::create(spec.width, spec.height, spec.nchannels, *type, ctx));
+  VOX_TRY(Image image, Image::create(spec.width, spec.height, count, *type, ctx));
   const int64_t samples = image.pixels() * image.channels();
   // Integers are asked for as they are: as floats the library would scale them to 0..1.
   std::unique_ptr<Buffer> stored;
@@ -123,13 +140,27 @@ Result<std::optional<Image>> read(const std::string& path, Context& ctx) {
     VOX_TRY(stored, Buffer::allocate(static_cast<uint64_t>(samples * sample_bytes(*type)), "an image", ctx));
   }
   void* pixels = stored ? static_cast<void*>(stored->data()) : image.row(0);
-  if (!input->read_image(0, 0, 0, spec.nchannels, file_type(*type), pixels))
+  if (!input->read_image(0, 0, first, first + count, file_type(*type), pixels))
     return bad_input(path, one_line(input->geterror()));
   if (stored) to_floats(stored->data(), *type, samples, image.row(0));
   return image;
 }
 
-Status write(const std::string& path, const Image& image, const std::string& format, OutputFile& file) {
+/// The samples of a row of the picture and of its layers, pixel by pixel; `stride` channels in all.
+void interleave(const Image& image, std::span<const ImageLayer> layers, int64_t y, int64_t stride,
+                float* out) {
+  const auto put = [&](const Image& from) {
+    const float* in = from.row(y);
+    for (int64_t x = 0; x < image.width(); ++x, in += from.channels())
+      std::copy_n(in, from.channels(), out + x * stride);
+    out += from.channels();
+  };
+  put(image);
+  for (const ImageLayer& layer : layers) put(layer.image);
+}
+
+Status write(const std::string& path, const Image& image, std::span<const ImageLayer> layers,
+             const std::string& format, OutputFile& file) {
   const auto failed = [&](const std::string& why) {
     return fail(ErrorCode::output, path, "cannot write: " + one_line(why));
   };
@@ -142,17 +173,27 @@ Status write(const std::string& path, const Image& image, const std::string& for
     spec.channelnames = {"Y", "A"};
     spec.alpha_channel = 1;
   }
+  for (const ImageLayer& layer : layers)
+    for (const char channel : layer.channels) {
+      spec.channelnames.push_back(layer.name + '.' + channel);
+      ++spec.nchannels;
+    }
   spec.attribute("compression", "zip");
   spec.attribute("oiio:UnassociatedAlpha", 1);
   spec.attribute("DateTime", "");  // else the library writes the time of day
   if (!output->open(file.temporary(), spec)) return failed(output->geterror());
-  const int64_t row_samples = image.width() * image.channels();
+  const int64_t row_samples = image.width() * spec.nchannels;
   constexpr int64_t rows_at_once = 64;
   std::vector<std::byte> rows(
       static_cast<size_t>(std::min(rows_at_once, image.height()) * row_samples * sample_bytes(image.type())));
   for (int64_t y = 0; y < image.height(); y += rows_at_once) {
     const int64_t end = std::min(y + rows_at_once, image.height());
-    from_floats(image.row(y), image.type(), (end - y) * row_samples, rows.data());
+    if (layers.empty())
+      from_floats(image.row(y), image.type(), (end - y) * row_samples, rows.data());
+    else
+      for (int64_t i = y; i < end; ++i)
+        interleave(image, layers, i, spec.nchannels,
+                   reinterpret_cast<float*>(rows.data()) + (i - y) * row_samples);
     if (!output->write_scanlines(static_cast<int>(y), static_cast<int>(end), 0, type, rows.data()))
       return failed(output->geterror());
   }
@@ -172,7 +213,8 @@ Result<std::optional<Image>> read_image_file(const std::string& path, Context& c
   }
 }
 
-Status write_image_file(const std::string& path, const Image& image, bool force) {
+Status write_image_file(const std::string& path, const Image& image, bool force,
+                        std::span<const ImageLayer> layers) {
   VOX_CHECK(check_image_output(path, force));
   const std::string format = image_format(path);
   const bool real = image.type() == SampleType::f32;
@@ -185,11 +227,19 @@ Status write_image_file(const std::string& path, const Image& image, bool force)
                     real        ? "floats"
                     : is_signed ? "signed integers"
                                 : "integers"));
+  for (const ImageLayer& layer : layers)
+    if (format != "openexr" || layer.image.type() != SampleType::f32 ||
+        layer.image.width() != image.width() || layer.image.height() != image.height() ||
+        std::ssize(layer.channels) != layer.image.channels())
+      return fail(ErrorCode::usage, path,
+                  fmt::format("the layer {} cannot be written: expected an .exr file, and {} x {} floats "
+                              "with a letter for each channel",
+                              layer.name, image.width(), image.height()));
   if (image.width() > INT32_MAX || image.height() > INT32_MAX)
     return fail(ErrorCode::usage, path, "the image is too large for its file: expected sides below 2^31");
   try {
     VOX_TRY(const auto file, OutputFile::create(path, force));
-    VOX_CHECK(write(path, image, format, *file));
+    VOX_CHECK(write(path, image, layers, format, *file));
     return file->commit();
   } catch (const std::bad_alloc&) {
     return fail(ErrorCode::limit, path, "not enough memory to write the image");

@@ -9,6 +9,7 @@
 namespace voxkit {
 
 Result<std::optional<Image>> read_image_file(const std::string& path, Context& ctx);
-Status write_image_file(const std::string& path, const Image& image, bool force);
+Status write_image_file(const std::string& path, const Image& image, bool force,
+                        std::span<const ImageLayer> layers);
 
 }  // namespace voxkit

@@ -15,7 +15,7 @@
 namespace voxkit {
 
 /// Grows with every change of ModuleTable or of a type that it mentions.
-inline constexpr uint32_t module_abi = 2;
+inline constexpr uint32_t module_abi = 3;
 
 struct ModuleTable {
   uint32_t abi = module_abi;
@@ -25,7 +25,8 @@ struct ModuleTable {
   SinkResult (*create)(const std::string& path, const VolumeInfo& info, bool force, Context& ctx) = nullptr;
   /// Single images (image_stack only): `read_image` and `write_image` of image.h.
   Result<std::optional<Image>> (*read_image)(const std::string& path, Context& ctx) = nullptr;
-  Status (*write_image)(const std::string& path, const Image& image, bool force) = nullptr;
+  Status (*write_image)(const std::string& path, const Image& image, bool force,
+                        std::span<const ImageLayer> layers) = nullptr;
 };
 
 /// A module, and what to tell a user who does not have it.

@@ -77,11 +77,12 @@ Result<std::optional<Image>> read_image(const std::string& path, Context& ctx) {
   return (*table)->read_image(path, ctx);
 }
 
-Status write_image(const std::string& path, const Image& image, bool force) {
+Status write_image(const std::string& path, const Image& image, bool force,
+                   std::span<const ImageLayer> layers) {
   auto table =
       load_module(module_folder(), {"image_stack", "writing images", "libopenimageio-dev", ErrorCode::usage});
   if (!table) return fail(table.error().code, path, table.error().what);
-  return (*table)->write_image(path, image, force);
+  return (*table)->write_image(path, image, force, layers);
 }
 
 SourceResult open_vdb(const std::string& path, const std::string& grid, Context& ctx) {

@@ -1,12 +1,15 @@
 #include <fmt/format.h>
 #include <gtest/gtest.h>
+#include <zlib.h>
 
 #include <chrono>
 #include <cmath>
 #include <limits>
+#include <map>
 #include <thread>
 
 #include "formats/image.h"
+#include "formats/little_endian.h"
 #include "formats/module.h"
 #include "tests/formats/file_format_test.h"
 
@@ -113,6 +116,167 @@ TEST_F(ImageFileTest, SameBytesEachTime) {
       else
         EXPECT_EQ(get(path(names[i])), first[i]) << names[i];
     }
+  }
+}
+
+/// What is in an OpenEXR file of one part, floats and blocks of 16 rows, by its specification.
+struct OpenExr {
+  std::map<std::string, std::string> attributes;  ///< name and value
+  std::map<std::string, std::vector<float>> channels;
+
+  OpenExr(const std::string& file, size_t width, size_t height) {
+    size_t at = 8;
+    const auto name = [&] {
+      const std::string text = file.c_str() + at;
+      at += text.size() + 1;
+      return text;
+    };
+    const auto number = [&](size_t from) { return load_le<uint32_t>(as_bytes(file) + from); };
+    while (file[at] != '\0') {
+      const std::string attribute = name();
+      name();  // its type
+      const size_t end = at + 4 + number(at);
+      at += 4;
+      attributes[attribute] = file.substr(at, end - at);
+      if (attribute == "channels")
+        for (; file[at] != '\0'; at += 16) {
+          const std::string channel = name();
+          EXPECT_EQ(number(at), 2u) << channel << " is not of floats";
+          channels[channel].resize(width * height);
+        }
+      at = end;
+    }
+    at += 1 + 8 * ((height + 15) / 16);
+    while (at < file.size()) {
+      const size_t y0 = number(at), bytes = number(at + 4), y1 = std::min(y0 + 16, height);
+      std::string block(4 * (y1 - y0) * width * channels.size(), '\0');
+      if (bytes == block.size())
+        block = file.substr(at + 8, bytes);
+      else
+        block = unzip(file.substr(at + 8, bytes), block.size());
+      const std::byte* in = as_bytes(block);
+      for (size_t y = y0; y < y1; ++y)
+        for (auto& [channel, samples] : channels)
+          for (size_t x = 0; x < width; ++x, in += 4) samples[y * width + x] = load_le<float>(in);
+      at += 8 + bytes;
+    }
+  }
+
+ private:
+  static const std::byte* as_bytes(const std::string& text) {
+    return reinterpret_cast<const std::byte*>(text.data());
+  }
+  /// Deflated are the differences of the bytes, and before these all even ones, then all odd ones.
+  static std::string unzip(const std::string& data, size_t size) {
+    std::string bytes(size, '\0'), out = bytes;
+    uLongf length = size;
+    EXPECT_EQ(uncompress(reinterpret_cast<Bytef*>(bytes.data()), &length,
+                         reinterpret_cast<const Bytef*>(data.data()), data.size()),
+              Z_OK);
+    for (size_t i = 1; i < size; ++i) bytes[i] = static_cast<char>(bytes[i - 1] + bytes[i] - 128);
+    for (size_t i = 0; i < size; ++i) out[i] = bytes[i / 2 + (i % 2 ? (size + 1) / 2 : 0)];
+    return out;
+  }
+};
+
+class ImageLayersTest : public ImageFileTest {
+ protected:
+  std::vector<ImageLayer> random_layers(int64_t width, int64_t height) {
+    std::vector<ImageLayer> layers;
+    layers.push_back({"depth", "Z", random_image(width, height, 1, SampleType::f32)});
+    layers.push_back({"normal", "XYZ", random_image(width, height, 3, SampleType::f32)});
+    layers[0].image.row(0)[0] = std::numeric_limits<float>::infinity();
+    return layers;
+  }
+};
+
+TEST_F(ImageLayersTest, AreChannelsOfOneFileBesideThePicture) {
+  constexpr int64_t width = 7, height = 131;
+  const std::string names[] = {"Y", "YA", "RGB", "RGBA"};
+  for (const int channels : {1, 2, 3, 4}) {
+    const Image image = random_image(width, height, channels, SampleType::f32);
+    const auto layers = random_layers(width, height);
+    const Status written = write_image(path("a.exr"), image, true, layers);
+    ASSERT_TRUE(written) << written.error().what;
+    const OpenExr file(get(path("a.exr")), width, height);
+    EXPECT_EQ(file.channels.size(), static_cast<size_t>(channels) + 4);
+    const auto expect_channel = [&](const std::string& name, const Image& from, int64_t c) {
+      ASSERT_TRUE(file.channels.contains(name)) << name;
+      for (int64_t i = 0; i < width * height; ++i)
+        ASSERT_EQ(file.channels.at(name)[static_cast<size_t>(i)], from.row(0)[i * from.channels() + c])
+            << name << " " << i;
+    };
+    for (int c = 0; c < channels; ++c)
+      expect_channel(std::string(1, names[channels - 1][static_cast<size_t>(c)]), image, c);
+    expect_channel("depth.Z", layers[0].image, 0);
+    expect_channel("normal.X", layers[1].image, 0);
+    expect_channel("normal.Y", layers[1].image, 1);
+    expect_channel("normal.Z", layers[1].image, 2);
+    expect_same(image, read_back(path("a.exr")));
+  }
+}
+
+TEST_F(ImageLayersTest, NothingIsStoredThatDiffersFromRunToRun) {
+  ASSERT_TRUE(write_image(path("a.exr"), random_image(4, 4, 4, SampleType::f32), false, random_layers(4, 4)));
+  auto attributes = OpenExr(get(path("a.exr")), 4, 4).attributes;
+  for (const char* fixed : {"channels", "compression", "dataWindow", "displayWindow", "lineOrder",
+                            "pixelAspectRatio", "screenWindowCenter", "screenWindowWidth"})
+    attributes.erase(fixed);
+  if (attributes.contains("capDate")) {
+    EXPECT_EQ(attributes["capDate"], "");
+    attributes.erase("capDate");
+  }
+  for (const auto& [attribute, value] : attributes) ADD_FAILURE() << attribute << ": " << value;
+}
+
+TEST_F(ImageLayersTest, OtherChannelsThanThePictureAreNotRead) {
+  // As other programs write it: five channels of no layer. Z comes after A, and is none of the picture's.
+  std::vector<ImageLayer> layers;
+  layers.push_back({"x", "Z", random_image(3, 3, 1, SampleType::f32)});
+  const Image image = random_image(3, 3, 3, SampleType::f32);
+  ASSERT_TRUE(write_image(path("a.exr"), image, false, layers));
+  expect_same(image, read_back(path("a.exr")));  // not four channels
+  // Where nothing is called as a picture's channels are, there must be four at most.
+  std::string file = get(path("a.exr"));
+  const size_t red = file.find(std::string("R\0\2", 3));
+  ASSERT_NE(red, std::string::npos);
+  file[red] = 'Q';
+  EXPECT_EQ(read_back(put("four.exr", file)).channels(), 4);
+  ASSERT_TRUE(write_image(path("b.exr"), image, false, random_layers(3, 3)));
+  file = get(path("b.exr"));
+  file[file.find(std::string("R\0\2", 3))] = 'Q';
+  const auto seven = read_image(put("seven.exr", file), ctx_);
+  ASSERT_FALSE(seven);
+  EXPECT_EQ(seven.error().code, ErrorCode::input);
+}
+
+TEST_F(ImageLayersTest, AreForOpenExrOfTheirSizeOnly) {
+  const Image image = random_image(4, 4, 3, SampleType::f32);
+  const auto refused = [&](const char* name, int64_t width, const char* channels, SampleType type) {
+    std::vector<ImageLayer> layers;
+    layers.push_back({"depth", channels, random_image(width, 4, 1, type)});
+    const Status written = write_image(path(name), image, false, layers);
+    return !written && written.error().code == ErrorCode::usage && !std::filesystem::exists(path(name));
+  };
+  EXPECT_TRUE(refused("a.tif", 4, "Z", SampleType::f32));
+  EXPECT_TRUE(refused("a.exr", 5, "Z", SampleType::f32));
+  EXPECT_TRUE(refused("a.exr", 4, "XY", SampleType::f32));
+  EXPECT_TRUE(refused("a.exr", 4, "Z", SampleType::u8));
+  EXPECT_FALSE(refused("a.exr", 4, "Z", SampleType::f32));
+}
+
+TEST_F(ImageLayersTest, CutAndDamagedFilesDoNoHarm) {
+  ASSERT_TRUE(write_image(path("a.exr"), random_image(5, 3, 4, SampleType::f32), false, random_layers(5, 3)));
+  const std::string whole = get(path("a.exr"));
+  for (size_t length = 0; length < whole.size(); ++length) {
+    const auto image = read_image(put("cut.exr", whole.substr(0, length)), ctx_);
+    ASSERT_FALSE(image) << length;
+    EXPECT_EQ(image.error().code, ErrorCode::input);
+  }
+  for (int round = 0; round < 300; ++round) {
+    std::string file = whole;
+    for (int i = 0; i < 3; ++i) file[random_() % file.size()] = static_cast<char>(random_());
+    (void)read_image(put("bad.exr", file), ctx_);
   }
 }
 
