@@ -37,6 +37,7 @@ struct GridTransform {
   glm::dvec3 point(const glm::dvec3& world) const { return (world + half) / voxel; }
   glm::dvec3 direction(const glm::dvec3& world) const { return world / voxel; }
   double smallest_edge() const { return std::min({voxel.x, voxel.y, voxel.z}); }
+  double largest_edge() const { return std::max({voxel.x, voxel.y, voxel.z}); }
 };
 
 /// The rays of a picture: through pixel (x, y), counted from the upper left, at offset (0.5, 0.5) = its

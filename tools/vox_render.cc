@@ -110,13 +110,11 @@ Result<Scene> open_scene(const std::string& name, const Options& o, Run& run) {
 }
 
 /// An 8-bit RGB picture.
-Result<Image> image_of(const Picture& picture, Context& ctx) {
-  VOX_TRY(Image image, Image::create(picture.width, picture.height, 3, SampleType::u8, ctx));
+Result<Image> image_of(const Image& picture, Context& ctx) {
+  VOX_TRY(Image image, Image::create(picture.width(), picture.height(), 3, SampleType::u8, ctx));
   for (int64_t y = 0; y < image.height(); ++y)
     for (int64_t x = 0; x < image.width(); ++x)
-      for (int64_t k = 0; k < 3; ++k)
-        image.row(y)[3 * x + k] =
-            std::round(255 * picture.rgba[static_cast<size_t>(4 * (y * image.width() + x) + k)]);
+      for (int64_t k = 0; k < 3; ++k) image.row(y)[3 * x + k] = std::round(255 * picture.row(y)[4 * x + k]);
   return image;
 }
 
@@ -204,10 +202,13 @@ Result<int> work(const Options& o, Run& run) {
       return bad_usage(fmt::format("--reference {}: {} x {} x {} voxels: expected as many as the input has",
                                    o.reference, other->info.dims.x, other->info.dims.y, other->info.dims.z));
   }
-  const double edge = GridTransform(scene.info).smallest_edge();
+  const double edge = GridTransform(scene.info).largest_edge();
   const auto picture_of = [&](const Frame& frame, const Camera& from) -> Result<Image> {
     VOX_TRY(Picture picture, shade(frame, from, edge, shade_options, run.ctx));
-    return image_of(rays_a_side > 1 ? downsample(picture, rays_a_side) : picture, run.ctx);
+    if (rays_a_side > 1) {
+      VOX_TRY(picture.rgba, downsample(picture.rgba, rays_a_side, run.ctx));
+    }
+    return image_of(picture.rgba, run.ctx);
   };
 
   run.stage("render");

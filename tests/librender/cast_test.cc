@@ -4,7 +4,7 @@
 #include <cmath>
 
 #include "formats/readers.h"
-#include "librender/shade.h"
+#include "librender/ray_cast.h"
 #include "tests/libsvmm/volumes.h"
 
 namespace voxkit::render {
@@ -136,53 +136,6 @@ TEST(Cast, ASphereIsRoundAndInTheMiddle) {
   EXPECT_NEAR(area / (3.14159265358979 * radius * radius), 1, 0.03);
   const auto& centre = frame->pixels[50 * 101 + 50];
   EXPECT_NEAR(centre.distance, 2.6 - 0.5 / 64, 2.0 / 64);
-}
-
-TEST(Shade, NormalsOfASpherePointOutwards) {
-  auto source = open_builtin("sphere:96");
-  CastOptions options = small();
-  options.width = options.height = 200;
-  options.range = {127, 128};  // a hard edge
-  Context ctx = context();
-  const Camera camera = Camera::orbit(35, 25, 2, 40);
-  const auto frame = cast(*dense(**source), camera, options, ctx);
-  const auto picture = shade(*frame, camera, 1.0 / 96, {}, ctx);
-  ASSERT_TRUE(picture);
-  const RayGenerator rays(camera, 200, 200);
-  double worst = 0, sum = 0;
-  int count = 0;
-  for (int y = 0; y < 200; ++y)
-    for (int x = 0; x < 200; ++x) {
-      const size_t i = static_cast<size_t>(y * 200 + x);
-      if (!std::isfinite(frame->pixels[i].distance)) continue;
-      const glm::dvec3 d = rays.direction(x + 0.5, y + 0.5),
-                       p = rays.eye() + d * double(frame->pixels[i].distance);
-      const double length = std::sqrt(p.x * p.x + p.y * p.y + p.z * p.z);
-      const double facing = -(p.x * d.x + p.y * d.y + p.z * d.z) / length;
-      if (facing < 0.3) continue;  // the rim
-      const double cosine = (picture->normals[3 * i] * p.x + picture->normals[3 * i + 1] * p.y +
-                             picture->normals[3 * i + 2] * p.z) /
-                            length;
-      const double angle = std::acos(std::min(1.0, cosine)) * 180 / 3.14159265358979;
-      worst = std::max(worst, angle);
-      sum += angle;
-      ++count;
-    }
-  ASSERT_GT(count, 5000);
-  EXPECT_LT(sum / count, 20);
-  EXPECT_LT(worst, 90);
-}
-
-TEST(Camera, TextIsChecked) {
-  EXPECT_TRUE(parse_camera("orbit:10,20,1.5", 45));
-  EXPECT_TRUE(parse_camera("lookat:0,0,2,0,0,0", 45));
-  for (const char* wrong : {"", "orbit:", "orbit:1,2", "orbit:1,2,3,4", "orbit:1,91,2", "orbit:1,2,0",
-                            "lookat:1,1,1,1,1,1", "orbit:a,b,c", "orbit:1,2,3x", "orbit:nan,0,1"})
-    EXPECT_FALSE(parse_camera(wrong, 45)) << wrong;
-  EXPECT_EQ(camera_path("thesis94", Camera{})->size(), 94u);
-  EXPECT_EQ(camera_path("orbit:7", Camera{})->size(), 7u);
-  for (const char* wrong : {"", "thesis", "orbit:0", "orbit:1.5", "orbit:-3"})
-    EXPECT_FALSE(camera_path(wrong, Camera{})) << wrong;
 }
 
 }  // namespace
