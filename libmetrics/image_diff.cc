@@ -5,6 +5,7 @@
 #include <algorithm>
 #include <cmath>
 #include <limits>
+#include <mutex>
 #include <vector>
 
 #include "formats/parallel.h"
@@ -71,8 +72,15 @@ Status check_comparable(const Image& a, const Image& b) {
   return {};
 }
 
-Result<ImageDiff> diff_images(const Image& a, const Image& b, std::optional<double> peak, Context& ctx) {
+Result<ImageDiff> diff_images(const Image& a, const Image& b, std::optional<double> peak, Context& ctx,
+                              ErrorHistogram* histogram) {
   VOX_CHECK(check_comparable(a, b));
+  using Kind = ErrorHistogram::Kind;
+  const Kind kind = a.type() == SampleType::f32   ? Kind::real
+                    : sample_bytes(a.type()) == 1 ? Kind::bytes
+                                                  : Kind::whole;
+  if (histogram != nullptr) *histogram = ErrorHistogram(kind);
+  std::mutex histogram_mutex;
   ImageDiff diff;
   diff.width = a.width();
   diff.height = a.height();
@@ -83,15 +91,22 @@ Result<ImageDiff> diff_images(const Image& a, const Image& b, std::optional<doub
   std::vector<Sums> blocks(static_cast<size_t>((a.pixels() + pixels_at_once - 1) / pixels_at_once));
   VOX_CHECK(for_blocks(a, ctx, [&](int64_t block, int64_t begin, int64_t end) {
     Sums sums;
+    std::optional<ErrorHistogram> counts;
+    if (histogram != nullptr) counts.emplace(kind);
     bool differs = false;
     visit_errors(a, b, begin, end, [&](int64_t, int c, double error) {
       sums.squares += error * error;
       if (c < colours) sums.colour_squares += error * error;
       sums.greatest = std::max(sums.greatest, error);
+      if (counts) counts->add(error);
       differs = (c > 0 && differs) || error != 0;
       if (c + 1 == diff.channels) sums.differing += differs;
     });
     blocks[static_cast<size_t>(block)] = sums;
+    if (counts) {
+      std::lock_guard lock(histogram_mutex);
+      histogram->add(*counts);
+    }
   }));
   Sums total;
   for (const Sums& sums : blocks) {

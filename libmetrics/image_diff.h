@@ -5,6 +5,7 @@
 #include <optional>
 
 #include "formats/image.h"
+#include "libmetrics/error_histogram.h"
 
 namespace voxkit {
 
@@ -27,9 +28,10 @@ struct ImageDiff {
 Status check_comparable(const Image& a, const Image& b);
 
 /// Compares two images. A NaN beside a NaN is no error; beside a number it is an infinite one. Sums are taken
-/// in double precision in a fixed order: the result is the same for any number of threads. Errors: those of
-/// check_comparable.
-Result<ImageDiff> diff_images(const Image& a, const Image& b, std::optional<double> peak, Context& ctx);
+/// in double precision in a fixed order: the result is the same for any number of threads. `histogram`:
+/// nullptr, or what is set to the histogram of the errors. Errors: those of check_comparable.
+Result<ImageDiff> diff_images(const Image& a, const Image& b, std::optional<double> peak, Context& ctx,
+                              ErrorHistogram* histogram = nullptr);
 
 /// |A - B|: of the bit depth of both, unsigned. Errors: those of check_comparable.
 Result<Image> error_image(const Image& a, const Image& b, Context& ctx);

@@ -7,6 +7,7 @@
 #include <cstring>
 #include <limits>
 #include <memory>
+#include <mutex>
 #include <type_traits>
 #include <vector>
 
@@ -51,6 +52,15 @@ struct Sums {
   }
 };
 
+/// Where errors are counted, one of every voxel `times` over.
+struct Counter {
+  ErrorHistogram* histogram = nullptr;
+  uint64_t times = 1;
+
+  void operator()(double error) const { histogram->add(error, times); }
+  explicit operator bool() const { return histogram != nullptr; }
+};
+
 /// Compares rows of voxels. `errors` may be null.
 class Comparison {
  public:
@@ -61,33 +71,36 @@ class Comparison {
         bias_a_(a.bias()),
         bias_b_(b.bias()) {}
 
-  void row(const std::byte* a, const std::byte* b, int64_t n, std::byte* errors, Sums& sums) const {
-    if (is_colour(a_)) return colours(a, b, n, errors, sums);
+  void row(const std::byte* a, const std::byte* b, int64_t n, std::byte* errors, Sums& sums,
+           const Counter& count) const {
+    if (is_colour(a_)) return colours(a, b, n, errors, sums, count);
     switch (a_) {
       case VoxelFormat::density16:
-        return first<uint16_t>(a, b, n, errors, sums);
+        return first<uint16_t>(a, b, n, errors, sums, count);
       case VoxelFormat::float32:
-        return first<float>(a, b, n, errors, sums);
+        return first<float>(a, b, n, errors, sums, count);
       default:
-        return first<uint8_t>(a, b, n, errors, sums);
+        return first<uint8_t>(a, b, n, errors, sums, count);
     }
   }
 
  private:
   template <class A>
-  void first(const std::byte* a, const std::byte* b, int64_t n, std::byte* errors, Sums& sums) const {
+  void first(const std::byte* a, const std::byte* b, int64_t n, std::byte* errors, Sums& sums,
+             const Counter& count) const {
     switch (b_) {
       case VoxelFormat::density16:
-        return scalars<A, uint16_t>(a, b, n, errors, sums);
+        return scalars<A, uint16_t>(a, b, n, errors, sums, count);
       case VoxelFormat::float32:
-        return scalars<A, float>(a, b, n, errors, sums);
+        return scalars<A, float>(a, b, n, errors, sums, count);
       default:
-        return scalars<A, uint8_t>(a, b, n, errors, sums);
+        return scalars<A, uint8_t>(a, b, n, errors, sums, count);
     }
   }
 
   template <class A, class B>
-  void scalars(const std::byte* a, const std::byte* b, int64_t n, std::byte* errors, Sums& sums) const {
+  void scalars(const std::byte* a, const std::byte* b, int64_t n, std::byte* errors, Sums& sums,
+               const Counter& count) const {
     if constexpr (std::is_integral_v<A> && std::is_integral_v<B>) {
       // Rows are shorter than 2^31, so sums of squares of 17 bit differences fit 64 bits... as do those of
       // samples.
@@ -114,10 +127,12 @@ class Comparison {
       part.hi = hi;
       part.differing = differing;
       sums.merge(part);
-      if (errors != nullptr) {
+      if (errors != nullptr || count) {
         for (int64_t i = 0; i < n; ++i) {
           const int32_t va = load_le<A>(a + i * static_cast<int64_t>(sizeof(A))) - bias_a;
           const int32_t vb = load_le<B>(b + i * static_cast<int64_t>(sizeof(B))) - bias_b;
+          if (count) count(std::abs(va - vb));
+          if (errors == nullptr) continue;
           if (error_ == VoxelFormat::float32)
             store_le(errors + 4 * i, static_cast<float>(std::abs(va - vb)));
           else
@@ -145,13 +160,15 @@ class Comparison {
         else
           part.differing += d != 0;
         part.greatest = std::max(part.greatest, d);
+        if (count) count(d);
         if (errors != nullptr) store_le(errors + 4 * i, static_cast<float>(d));
       }
       sums.merge(part);
     }
   }
 
-  void colours(const std::byte* a, const std::byte* b, int64_t n, std::byte* errors, Sums& sums) const {
+  void colours(const std::byte* a, const std::byte* b, int64_t n, std::byte* errors, Sums& sums,
+               const Counter& count) const {
     const int bytes_a = voxel_bytes(a_), bytes_b = voxel_bytes(b_), bytes = std::max(bytes_a, bytes_b);
     uint64_t squares = 0, rgb_squares = 0, absolute = 0, signal = 0, differing = 0, farthest = 0;
     int greatest = 0;
@@ -166,6 +183,7 @@ class Comparison {
         absolute += static_cast<uint64_t>(d);
         signal += static_cast<uint64_t>(va * va);
         greatest = std::max(greatest, d);
+        if (count) count(d);
         if (errors != nullptr) *errors++ = static_cast<std::byte>(d);
       }
       squares += voxel;
@@ -212,6 +230,12 @@ VolumeDiff summarise(const Sums& sums, const VolumeInfo& a, int channels, std::o
     diff.grmse_distance = std::sqrt(rgb / voxels);
   }
   return diff;
+}
+
+ErrorHistogram::Kind error_kind(VoxelFormat a, VoxelFormat b) {
+  using Kind = ErrorHistogram::Kind;
+  if (a == VoxelFormat::float32 || b == VoxelFormat::float32) return Kind::real;
+  return a == VoxelFormat::density16 || b == VoxelFormat::density16 ? Kind::whole : Kind::bytes;
 }
 
 /// One side of the comparison: a slab at a time where the source is forward-only, else tile by tile.
@@ -266,7 +290,7 @@ VolumeInfo error_volume_info(const VolumeInfo& a, const VolumeInfo& b) {
 }
 
 Result<VolumeDiff> diff_volumes(VolumeSource& a, VolumeSource& b, std::optional<double> peak,
-                                VolumeSink* errors, Context& ctx) {
+                                VolumeSink* errors, Context& ctx, ErrorHistogram* histogram) {
   const VolumeInfo& info = a.info();
   if (info.dims != b.info().dims) {
     const Index3 p = info.dims, q = b.info().dims;
@@ -290,6 +314,9 @@ Result<VolumeDiff> diff_volumes(VolumeSource& a, VolumeSource& b, std::optional<
     VOX_TRY(error_buffer, Buffer::allocate(slabs.bytes(), "a slab of errors", ctx));
   }
   const Comparison compare(info, b.info());
+  const auto kind = error_kind(info.format, b.info().format);
+  if (histogram != nullptr) *histogram = ErrorHistogram(kind);
+  std::mutex histogram_mutex;
 
   Sums total;
   for (int64_t s = 0; s < slabs.count(); ++s) {
@@ -306,36 +333,45 @@ Result<VolumeDiff> diff_volumes(VolumeSource& a, VolumeSource& b, std::optional<
       return VoxelSpan{error_slab.row(at.y, at.z) + at.x * error_bytes, error_slab.row_stride,
                        error_slab.slice_stride};
     };
-    const auto known = [&](const Box& box, Sums& sums) {
+    const auto known = [&](const Box& box, Sums& sums, ErrorHistogram* counts) {
       const auto value_a = a.uniform(box);
       const auto value_b = value_a ? b.uniform(box) : std::nullopt;
       if (!value_b) return false;
       Sums one;
       Voxel error;
-      compare.row(value_a->bytes.data(), value_b->bytes.data(), 1, error.bytes.data(), one);
-      sums.merge(one, static_cast<uint64_t>(box.voxels()));
+      const auto times = static_cast<uint64_t>(box.voxels());
+      compare.row(value_a->bytes.data(), value_b->bytes.data(), 1, error.bytes.data(), one, {counts, times});
+      sums.merge(one, times);
       if (error_buffer) fill(errors_at(box), box.size(), error_info.format, error);
       return true;
     };
 
-    if (!known(slab, total)) {
+    if (!known(slab, total, histogram)) {
       for (const Side& side : sides) side.source.expect(slab.lo.z, slab.hi.z);
       std::vector<Sums> parts(static_cast<size_t>(Slabs::tiles(slab)));
       const Status status = parallel_for(ctx, Slabs::tiles(slab), [&](int64_t t) -> Status {
         const Box tile = Slabs::tile(slab, t);
         Sums& sums = parts[static_cast<size_t>(t)];
         std::unique_ptr<std::byte[]> own[2];
-        return walk_tile(
-            tile, [&](const Box& box) { return known(box, sums); },
+        std::optional<ErrorHistogram> counts;
+        if (histogram != nullptr) counts.emplace(kind);
+        VOX_CHECK(walk_tile(
+            tile, [&](const Box& box) { return known(box, sums, counts ? &*counts : nullptr); },
             [&](const Box& box) -> Status {
               VOX_TRY(const auto voxels_a, sides[0].voxels(slab, tile, box, own[0]));
               VOX_TRY(const auto voxels_b, sides[1].voxels(slab, tile, box, own[1]));
               for (int64_t z = 0; z < box.size().z; ++z)
                 for (int64_t y = 0; y < box.size().y; ++y)
                   compare.row(voxels_a.row(y, z), voxels_b.row(y, z), box.size().x,
-                              error_buffer ? errors_at(box).row(y, z) : nullptr, sums);
+                              error_buffer ? errors_at(box).row(y, z) : nullptr, sums,
+                              {counts ? &*counts : nullptr});
               return {};
-            });
+            }));
+        if (counts) {
+          std::lock_guard lock(histogram_mutex);
+          histogram->add(*counts);
+        }
+        return {};
       });
       VOX_CHECK(status);
       for (const Sums& part : parts) total.merge(part);

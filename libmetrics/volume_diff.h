@@ -6,6 +6,7 @@
 
 #include "formats/context.h"
 #include "formats/source.h"
+#include "libmetrics/error_histogram.h"
 
 namespace voxkit {
 
@@ -20,7 +21,7 @@ struct VolumeDiff {
   double psnr_db = 0;          ///< 10 log10(peak^2 / mse); infinite where nothing differs
   double snr_db = 0;           ///< 10 log10(mean square of A / mse)
   double max_abs_error = 0, mean_abs_error = 0;
-  double max_distance = 0;  ///< greatest Euclidean distance of two voxels; for scalars max_abs_error
+  double max_distance = 0;        ///< greatest Euclidean distance of two voxels; for scalars max_abs_error
   uint64_t differing_voxels = 0;  ///< voxels whose bytes differ (of different formats: whose values differ)
   std::optional<double> grmse;    ///< colours: sqrt(sum of squared R, G, B errors / 3 voxels)
   std::optional<double> grmse_distance;  ///< colours: sqrt(sum of squared R, G, B errors / voxels)
@@ -31,10 +32,10 @@ struct VolumeDiff {
 /// the same for any number of threads. RGB24 beside RGBA32 has alpha 255. A NaN beside a NaN is no error;
 /// beside a number it is an infinite one. Boxes where both sources are uniform are not read. `peak`:
 /// overrides full_scale. `errors`: nullptr, or a sink of `error_volume_info` that receives |A - B| and is
-/// finished. Errors: ErrorCode::usage where extents differ or a colour meets a scalar; those of the sources
-/// and the sink.
+/// finished. `histogram`: nullptr, or what is set to the histogram of the errors. Errors: ErrorCode::usage
+/// where extents differ or a colour meets a scalar; those of the sources and the sink.
 Result<VolumeDiff> diff_volumes(VolumeSource& a, VolumeSource& b, std::optional<double> peak,
-                                VolumeSink* errors, Context& ctx);
+                                VolumeSink* errors, Context& ctx, ErrorHistogram* histogram = nullptr);
 
 /// What |A - B| is stored as: the format of both, without bias, or FLOAT32 where they differ.
 VolumeInfo error_volume_info(const VolumeInfo& a, const VolumeInfo& b);

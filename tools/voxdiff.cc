@@ -26,6 +26,7 @@ struct Options {
   OpenOptions open;
   std::string space = "srgb";  ///< of colour distances; lab adds CIELAB
   std::optional<double> fail_psnr, fail_max, fail_ms_ssim, peak;
+  bool histogram = false;
 };
 
 void declare(CommandLine& line, Options& o) {
@@ -42,11 +43,38 @@ void declare(CommandLine& line, Options& o) {
                 return *o.peak > 0 ? Status{}
                                    : bad_usage("\"" + text + "\": expected a number greater than 0");
               });
+  line.flag("--histogram", "Print how the absolute errors are distributed (--json always does)", o.histogram);
   line.text("-o,--output", "ERR", "Write the absolute errors as a volume or an image", o.errors);
   declare_input_options(line, o.open);
 }
 
-Json describe(const VolumeDiff& d, const Run& run, const Options& o, bool passed) {
+/// Shares of the samples, in percent, whose greatest errors are said.
+constexpr double shares[] = {50, 95, 99, 99.9};
+
+Json describe(const ErrorHistogram& histogram) {
+  Json percentiles = Json::object(), errors = Json::array(), counts = Json::array();
+  for (const double share : shares)
+    percentiles.set(fmt::format("{}", share), histogram.percentile(share / 100));
+  for (const auto& bin : histogram.bins()) {
+    errors.push(bin.least);
+    counts.push(static_cast<int64_t>(bin.count));
+  }
+  Json json = Json::object();
+  json.set("samples", histogram.samples()).set("percentiles", std::move(percentiles));
+  json.set("errors", std::move(errors)).set("counts", std::move(counts));
+  return json;
+}
+
+std::string readable_line(const ErrorHistogram& histogram) {
+  std::string text = "error percentiles ";
+  for (const double share : shares)
+    text += fmt::format("{}{} % <= {}", share == shares[0] ? "" : ", ", share,
+                        readable(histogram.percentile(share / 100)));
+  return text + "\n";
+}
+
+Json describe(const VolumeDiff& d, const ErrorHistogram& histogram, const Run& run, const Options& o,
+              bool passed) {
   Json json = Json::result();
   json.set("tool", run.tool).set("version", version_text()).set("a", o.a).set("b", o.b);
   json.set("dims", d.dims)
@@ -58,7 +86,7 @@ Json describe(const VolumeDiff& d, const Run& run, const Options& o, bool passed
       .set("differing_voxels", d.differing_voxels)
       .set("snr_db", d.snr_db);
   if (d.grmse) json.set("grmse", *d.grmse).set("grmse_distance", *d.grmse_distance);
-  json.set("passed", passed);
+  json.set("histogram", describe(histogram)).set("passed", passed);
   return json;
 }
 
@@ -102,20 +130,24 @@ Result<int> compare_volumes(const Options& o, Run& run) {
     VOX_TRY(sink, create_volume(o.errors, error_volume_info(info_a, info_b), run.options.force, run.ctx));
   }
   run.stage("compare");
-  VOX_TRY(const VolumeDiff d, diff_volumes(*a.source, *b.source, o.peak, sink.get(), run.ctx));
+  const bool count = o.histogram || run.options.json;
+  ErrorHistogram histogram;
+  VOX_TRY(const VolumeDiff d,
+          diff_volumes(*a.source, *b.source, o.peak, sink.get(), run.ctx, count ? &histogram : nullptr));
 
   const bool passed =
       !(o.fail_psnr && !(d.psnr_db >= *o.fail_psnr)) && !(o.fail_max && !(d.max_abs_error <= *o.fail_max));
   if (run.options.json) {
-    VOX_CHECK(print(describe(d, run, o, passed).text()));
+    VOX_CHECK(print(describe(d, histogram, run, o, passed).text()));
   } else if (!run.options.quiet) {
-    VOX_CHECK(print(readable_lines(d)));
+    VOX_CHECK(print(readable_lines(d) + (o.histogram ? readable_line(histogram) : "")));
   }
   return passed ? 0 : 1;
 }
 
 struct ImageResult {
   ImageDiff diff;
+  ErrorHistogram histogram;        ///< with --json or --histogram
   Ssim ssim;                       ///< of the luma
   std::vector<Ssim> channel_ssim;  ///< colours
   std::optional<LabDiff> lab;
@@ -123,7 +155,8 @@ struct ImageResult {
 
 Result<ImageResult> measure(const Image& a, const Image& b, const Options& o, Run& run) {
   ImageResult result;
-  VOX_TRY(result.diff, diff_images(a, b, o.peak, run.ctx));
+  const bool count = o.histogram || run.options.json;
+  VOX_TRY(result.diff, diff_images(a, b, o.peak, run.ctx, count ? &result.histogram : nullptr));
   {
     VOX_TRY(const Image luma_a, luma(a, run.ctx));
     VOX_TRY(const Image luma_b, luma(b, run.ctx));
@@ -160,7 +193,7 @@ Json describe(const ImageResult& r, const Run& run, const Options& o, bool passe
   json.set("max_abs_error", d.max_abs_error).set("differing_pixels", d.differing_pixels);
   if (d.grmse) json.set("grmse", *d.grmse).set("grmse_distance", *d.grmse_distance);
   if (r.lab) json.set("delta_e_mean", r.lab->mean_delta_e).set("delta_e_max", r.lab->max_delta_e);
-  json.set("passed", passed);
+  json.set("histogram", describe(r.histogram)).set("passed", passed);
   return json;
 }
 
@@ -214,7 +247,7 @@ Result<int> compare_images(const Image& a, const Image& b, const Options& o, Run
   if (run.options.json) {
     VOX_CHECK(print(describe(r, run, o, passed).text()));
   } else if (!run.options.quiet) {
-    VOX_CHECK(print(readable_lines(r)));
+    VOX_CHECK(print(readable_lines(r) + (o.histogram ? readable_line(r.histogram) : "")));
   }
   return passed ? 0 : 1;
 }
@@ -252,6 +285,7 @@ int main(int argc, char** argv) {
       "Compares two volumes or images. Exits 1 if their sizes differ or a --fail limit is broken; "
       "--fail-max 0 asks for equality.",
       "  voxdiff head.nrrd head.svmm\n"
+      "  voxdiff head.nrrd head.svmm --histogram\n"
       "  voxdiff head.nrrd head.svmm --json --fail-psnr 40 --fail-max 12\n"
       "  voxdiff a.nrrd b.nrrd -o errors.nrrd\n"
       "  voxdiff a.png b.png --fail-ms-ssim 0.98 --space lab -o errors.png\n",
