@@ -40,23 +40,32 @@ Camera Camera::orbit(double az, double el, double distance, double fov) {
   return camera;
 }
 
+const char* expected_of(const Camera& camera) {
+  constexpr double farthest = 1e9;  // squares of what is larger might be infinite
+  for (const glm::dvec3& p : {camera.eye, camera.target})
+    if (!(std::abs(p.x) <= farthest && std::abs(p.y) <= farthest && std::abs(p.z) <= farthest))
+      return "coordinates from -1e9 to 1e9";
+  return camera.eye == camera.target ? "an eye that is not the target" : nullptr;
+}
+
 Result<Camera> parse_camera(const std::string& text, double fov) {
+  Camera camera;
   if (text.starts_with("orbit:")) {
     VOX_TRY(const auto v,
             numbers(text.substr(6), 3, "orbit:AZ,EL,DIST in degrees and units of the longest side"));
     if (v[1] < -90 || v[1] > 90 || v[2] <= 0)
       return bad_usage(
           fmt::format("\"{}\": expected an elevation from -90 to 90 and a distance above 0", text));
-    return Camera::orbit(v[0], v[1], v[2], fov);
-  }
-  if (text.starts_with("lookat:")) {
+    camera = Camera::orbit(v[0], v[1], v[2], fov);
+  } else if (text.starts_with("lookat:")) {
     VOX_TRY(const auto v, numbers(text.substr(7), 6, "lookat:EX,EY,EZ,TX,TY,TZ"));
-    Camera camera{{v[0], v[1], v[2]}, {v[3], v[4], v[5]}, fov};
-    if (camera.eye == camera.target)
-      return bad_usage(fmt::format("\"{}\": expected an eye that is not the target", text));
-    return camera;
+    camera = {{v[0], v[1], v[2]}, {v[3], v[4], v[5]}, fov};
+  } else {
+    return bad_usage(fmt::format("\"{}\": expected orbit:AZ,EL,DIST or lookat:EX,EY,EZ,TX,TY,TZ", text));
   }
-  return bad_usage(fmt::format("\"{}\": expected orbit:AZ,EL,DIST or lookat:EX,EY,EZ,TX,TY,TZ", text));
+  if (const char* expected = expected_of(camera))
+    return bad_usage(fmt::format("\"{}\": expected {}", text, expected));
+  return camera;
 }
 
 Result<std::vector<Camera>> camera_path(const std::string& name, const Camera& camera) {
@@ -81,7 +90,7 @@ Result<std::vector<Camera>> camera_path(const std::string& name, const Camera& c
     turn(static_cast<int>(v[0]), distance);
     return path;
   }
-  return bad_usage(fmt::format("--path \"{}\": expected thesis94 or orbit:N", name));
+  return bad_usage(fmt::format("--path \"{}\": expected thesis94, orbit:N or FILE.json", name));
 }
 
 GridTransform::GridTransform(const VolumeInfo& info) {

@@ -15,12 +15,17 @@ namespace voxkit::render {
 struct Camera {
   glm::dvec3 eye{0, 0, 2};
   glm::dvec3 target{0, 0, 0};
-  double fov = 45;  ///< full vertical angle in degrees, 0 < fov < 180
+  double fov = 45;  ///< full vertical angle in degrees
 
   /// Looks at the centre from azimuth `az` (degrees, 0 = from +z, 90 = from +x) and elevation `el` (-90..90,
   /// from above positive).
   static Camera orbit(double az, double el, double distance, double fov);
 };
+
+inline constexpr double least_fov = 0.01, greatest_fov = 179;
+
+/// What a camera should be and is not, such as "an eye that is not the target"; null where all is well.
+const char* expected_of(const Camera& camera);
 
 /// "orbit:AZ,EL,DIST" or "lookat:EX,EY,EZ,TX,TY,TZ"; ErrorCode::usage says what was expected.
 Result<Camera> parse_camera(const std::string& text, double fov);

@@ -5,12 +5,18 @@
 #include <cmath>
 #include <cstdio>
 #include <numeric>
+#include <string_view>
+#include <utility>
+#include <vector>
 
 #include "formats/copy.h"
 #include "formats/image.h"
 #include "formats/output_file.h"
+#include "formats/readers.h"
 #include "libmetrics/image_diff.h"
 #include "libmetrics/ssim.h"
+#include "librender/camera_file.h"
+#include "librender/layers.h"
 #include "librender/shade.h"
 #include "tools/common/input.h"
 #include "tools/common/json.h"
@@ -22,20 +28,58 @@ namespace {
 
 using namespace voxkit::render;
 
+constexpr int most_rays_a_side = 65536;  ///< of a picture
+
 struct Options {
   std::string input, output, path, report, reference;
   OpenOptions open;
   int width = 1024, height = 768;
-  std::string camera = "orbit:30,20,1.8", traversal = "path", shade = "phong", aa = "none", lod = "off",
+  std::string camera = "orbit:30,20,1.8", mode = "surface", traversal = "path", shade = "phong", lod = "off",
               device = "cpu";
+  bool depth_antialias = false;
+  int rays_a_side = 1;  ///< of a pixel
+  std::vector<Layer> layers;
   double fov = 45;
   std::optional<ValueRange> range;
   bool no_images = false;
 };
 
+Status parse_antialias(const std::string& text, Options& o) {
+  constexpr int most = 16;
+  o.depth_antialias = text == "depth";
+  o.rays_a_side = 1;
+  if (text == "none" || text == "depth") return {};
+  const auto n = text.starts_with("ssaa:") ? read_integer(text.substr(5), 2, most) : bad_usage({});
+  if (!n)
+    return bad_usage(fmt::format("\"{}\": expected none, depth or ssaa:N with N from 2 to {}", text, most));
+  o.rays_a_side = static_cast<int>(*n);
+  return {};
+}
+
+Status parse_layers(const std::string& text, std::vector<Layer>& layers) {
+  const std::pair<std::string_view, Layer> names[] = {{"depth", Layer::depth},
+                                                      {"normal", Layer::normal},
+                                                      {"position", Layer::position},
+                                                      {"steps", Layer::steps}};
+  layers.clear();
+  for (size_t at = 0; at <= text.size();) {
+    const size_t comma = std::min(text.find(',', at), text.size());
+    const auto found = std::find_if(std::begin(names), std::end(names), [&](const auto& name) {
+      return name.first == std::string_view(text).substr(at, comma - at);
+    });
+    if (found == std::end(names) || std::find(layers.begin(), layers.end(), found->second) != layers.end())
+      return bad_usage(fmt::format(
+          "\"{}\": expected some of depth, normal, position and steps, with commas between them", text));
+    layers.push_back(found->second);
+    at = comma + 1;
+  }
+  return {};
+}
+
 void declare(CommandLine& line, Options& o) {
   line.argument("INPUT", "Volume: a file, a built-in such as menger:5, or -", o.input);
-  line.text("-o,--output", "OUT", "Picture (.png .tif .exr), with --path a pattern such as frame-%04d.png",
+  line.text("-o,--output", "OUT",
+            "Picture (.png .tif, or .exr for floats), with --path a pattern such as frame-%04d.png",
             o.output);
   line.option("--size", "WxH", "Size of the picture in pixels (1024x768)",
               [&o](const std::string& text) -> Status {
@@ -51,7 +95,10 @@ void declare(CommandLine& line, Options& o) {
             "orbit:AZ,EL,DIST or lookat:EX,EY,EZ,TX,TY,TZ; the longest side is 1 (orbit:30,20,1.8)",
             o.camera);
   line.option("--fov", "DEG", "Vertical field of view (45)", number(o.fov, 0.01, 179));
-  line.text("--path", "PATH", "A camera path: thesis94 or orbit:N", o.path);
+  line.text("--path", "PATH",
+            "A camera path: thesis94, orbit:N or FILE.json, as tools/README.md describes it", o.path);
+  line.option("--mode", "MODE", "surface: shades what a ray meets first (surface)",
+              one_of(o.mode, {"surface"}));
   line.option("--traversal", "KIND",
               "path: keeps the path of blocks; restart: from the root at every step; baseline: voxel by "
               "voxel in floats, dense volumes "
@@ -59,8 +106,14 @@ void declare(CommandLine& line, Options& o) {
               one_of(o.traversal, {"path", "restart", "baseline"}));
   line.option("--shade", "KIND", "none, phong, ssao or phong+ssao (phong)",
               one_of(o.shade, {"none", "phong", "ssao", "phong+ssao"}));
-  line.option("--aa", "KIND", "none; depth: softens steps in depth; ssaa:N: N x N rays a pixel (none)",
-              one_of(o.aa, {"none", "depth", "ssaa:2", "ssaa:3", "ssaa:4", "ssaa:8"}));
+  line.option("--aa", "KIND",
+              "none; depth: softens steps in depth; ssaa:N: N x N rays a pixel, N from 2 to 16 (none)",
+              [&o](const std::string& text) { return parse_antialias(text, o); });
+  line.option(
+      "--aov", "LAYERS",
+      "Further layers of an .exr, as floats: some of depth,normal,position,steps; with ssaa:N those of "
+      "the ray at the pixel's centre",
+      [&o](const std::string& text) { return parse_layers(text, o.layers); });
   line.option("--lod", "on|off", "Stop at voxels as small as a pixel (off)", one_of(o.lod, {"on", "off"}));
   line.option("--device", "DEVICE", "Where to render: cpu (cpu)", one_of(o.device, {"cpu", "cuda"}));
   declare_range_option(line, o.range,
@@ -118,6 +171,32 @@ Result<Image> image_of(const Image& picture, Context& ctx) {
   return image;
 }
 
+/// Memory that is held from the start, so that too large a picture is refused before any work.
+class Held {
+ public:
+  /// For the frames of the input and of the reference. What comes of them must fit beside them, but counts
+  /// when it is made.
+  static Result<Held> for_frames(const Options& o, bool pictures, Context& ctx) {
+    const uint64_t pixels = static_cast<uint64_t>(o.width) * static_cast<uint64_t>(o.height);
+    const uint64_t rays = pixels * static_cast<uint64_t>(o.rays_a_side * o.rays_a_side);
+    const uint64_t frames = rays * sizeof(Pixel) * (o.reference.empty() ? 1 : 2);
+    constexpr uint64_t written_bytes = (4 + 3 + 3 + 8) * sizeof(float);  // a pixel: floats, integers, layers
+    const uint64_t rest = pictures ? rays * shading_bytes + pixels * written_bytes : 0;
+    const std::string what =
+        fmt::format("a frame of {} x {} rays", o.width * o.rays_a_side, o.height * o.rays_a_side);
+    VOX_CHECK(ctx.memory->reserve(frames + rest, what));
+    ctx.memory->release(rest);
+    return Held(*ctx.memory, frames);
+  }
+  Held(Held&& other) noexcept : budget_(other.budget_), bytes_(std::exchange(other.bytes_, 0)) {}
+  ~Held() { budget_.release(bytes_); }
+
+ private:
+  Held(MemoryBudget& budget, uint64_t bytes) : budget_(budget), bytes_(bytes) {}
+  MemoryBudget& budget_;
+  uint64_t bytes_;
+};
+
 /// What the frames of one volume cost.
 struct Costs {
   Json frames = Json::array();
@@ -161,9 +240,17 @@ Result<int> work(const Options& o, Run& run) {
   if (o.device == "cuda")
     return fail(ErrorCode::device, {}, "--device cuda: this build has no CUDA: expected cpu");
   if (o.output.empty() && !o.no_images) return bad_usage("no output: expected -o OUT.png, or --no-images");
+  const bool exr = !o.no_images && has_ending(o.output, ".exr");
+  if (!o.layers.empty() && !exr)
+    return bad_usage("--aov: layers are part of an OpenEXR file: expected -o OUT.exr");
+  if (std::max(o.width, o.height) * o.rays_a_side > most_rays_a_side)
+    return bad_usage(fmt::format("{} x {} rays: expected at most {} a side", o.width * o.rays_a_side,
+                                 o.height * o.rays_a_side, most_rays_a_side));
   VOX_TRY(const Camera camera, parse_camera(o.camera, o.fov));
   std::vector<Camera> cameras = {camera};
-  if (!o.path.empty()) {
+  if (has_ending(o.path, ".json")) {
+    VOX_TRY(cameras, read_camera_file(o.path, o.fov));
+  } else if (!o.path.empty()) {
     VOX_TRY(cameras, camera_path(o.path, camera));
   }
   std::vector<std::string> names;
@@ -181,10 +268,12 @@ Result<int> work(const Options& o, Run& run) {
   }
   if (!o.report.empty()) VOX_CHECK(check_output(o.report, run.options.force));
 
-  const int rays_a_side = o.aa.starts_with("ssaa:") ? o.aa[5] - '0' : 1;
+  const bool normals = std::find(o.layers.begin(), o.layers.end(), Layer::normal) != o.layers.end();
+  const bool pictures = !names.empty() || !o.reference.empty();
+  VOX_TRY(const Held frames, Held::for_frames(o, pictures, run.ctx));
   CastOptions cast_options;
-  cast_options.width = o.width * rays_a_side;
-  cast_options.height = o.height * rays_a_side;
+  cast_options.width = o.width * o.rays_a_side;
+  cast_options.height = o.height * o.rays_a_side;
   cast_options.traversal = o.traversal == "restart"    ? Traversal::restart
                            : o.traversal == "baseline" ? Traversal::baseline
                                                        : Traversal::path;
@@ -192,7 +281,7 @@ Result<int> work(const Options& o, Run& run) {
   ShadeOptions shade_options;
   shade_options.phong = o.shade.find("phong") != std::string::npos;
   shade_options.ssao = o.shade.find("ssao") != std::string::npos;
-  shade_options.depth_antialias = o.aa == "depth";
+  shade_options.depth_antialias = o.depth_antialias;
 
   VOX_TRY(const Scene scene, open_scene(o.input, o, run));
   std::optional<Scene> other;
@@ -203,12 +292,13 @@ Result<int> work(const Options& o, Run& run) {
                                    o.reference, other->info.dims.x, other->info.dims.y, other->info.dims.z));
   }
   const double edge = GridTransform(scene.info).largest_edge();
-  const auto picture_of = [&](const Frame& frame, const Camera& from) -> Result<Image> {
-    VOX_TRY(Picture picture, shade(frame, from, edge, shade_options, run.ctx));
-    if (rays_a_side > 1) {
-      VOX_TRY(picture.rgba, downsample(picture.rgba, rays_a_side, run.ctx));
+  const auto shaded = [&](const Frame& seen, const Camera& from, bool with_normals) -> Result<Picture> {
+    shade_options.normals = with_normals;
+    VOX_TRY(Picture picture, shade(seen, from, edge, shade_options, run.ctx));
+    if (o.rays_a_side > 1) {
+      VOX_TRY(picture.rgba, downsample(picture.rgba, o.rays_a_side, run.ctx));
     }
-    return image_of(picture.rgba, run.ctx);
+    return picture;
   };
 
   run.stage("render");
@@ -219,16 +309,25 @@ Result<int> work(const Options& o, Run& run) {
     VOX_TRY(const Frame frame, scene.draw(cameras[i], cast_options, run.ctx));
     Json json = Json::object();
     std::optional<Image> picture;
-    if (!names.empty() || other) {
-      VOX_TRY(picture, picture_of(frame, cameras[i]));
+    if (pictures) {
+      VOX_TRY(Picture floats, shaded(frame, cameras[i], normals));
+      std::vector<ImageLayer> layers;
+      for (const Layer layer : o.layers) {
+        VOX_TRY(ImageLayer made,
+                make_layer(layer, frame, cameras[i], floats.normals, o.rays_a_side, run.ctx));
+        layers.push_back(std::move(made));
+      }
+      if (exr) VOX_CHECK(write_image(names[i], floats.rgba, run.options.force, layers));
+      VOX_TRY(picture, image_of(floats.rgba, run.ctx));
+      if (!exr && !names.empty()) VOX_CHECK(write_image(names[i], *picture, run.options.force));
     }
-    if (!names.empty()) VOX_CHECK(write_image(names[i], *picture, run.options.force));
     if (other) {
       CastOptions dense_options = cast_options;
       if (other->compressed && dense_options.traversal == Traversal::baseline)
         dense_options.traversal = Traversal::path;
       VOX_TRY(const Frame expected, other->draw(cameras[i], dense_options, run.ctx));
-      VOX_TRY(const Image reference, picture_of(expected, cameras[i]));
+      VOX_TRY(const Picture floats, shaded(expected, cameras[i], false));
+      VOX_TRY(const Image reference, image_of(floats.rgba, run.ctx));
       VOX_TRY(const ImageDiff diff, diff_images(reference, *picture, std::nullopt, run.ctx));
       VOX_TRY(const Image a, luma(reference, run.ctx));
       VOX_TRY(const Image b, luma(*picture, run.ctx));
@@ -244,9 +343,7 @@ Result<int> work(const Options& o, Run& run) {
   const double average = costs.average(), speed = costs.mrays_per_s();
   Json json = Json::result();
   json.set("tool", run.tool).set("version", version_text()).set("input", o.input).set("device", "cpu");
-  json.set("size", fmt::format("{}x{}", o.width, o.height))
-      .set("mode", "surface")
-      .set("traversal", o.traversal);
+  json.set("size", fmt::format("{}x{}", o.width, o.height)).set("mode", o.mode).set("traversal", o.traversal);
   costs.write(json);
   if (other) {
     Json reference = Json::object();
@@ -280,6 +377,8 @@ int main(int argc, char** argv) {
       argc, argv, "vox-render", "Renders volumes, straight from the compressed form.",
       "  vox-render menger:4 -o sponge.png\n"
       "  vox-render scan.svmm -o scan.png --camera orbit:120,30,1.6 --size 1920x1080 --shade phong+ssao\n"
+      "  vox-render scan.svmm -o scan.exr --aa ssaa:3 --aov depth,normal\n"
+      "  vox-render scan.svmm -o frame-%04d.png --path flight.json\n"
       "  vox-render scan.svmm -o scan.png --reference scan.nrrd\n"
       "  vox-render scan.svmm --path thesis94 --no-images --report cost.json\n",
       [&](CommandLine& line) { declare(line, options); }, [&](Run& run) { return work(options, run); });
