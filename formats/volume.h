@@ -10,6 +10,8 @@
 #include <optional>
 #include <string_view>
 
+#include "formats/hd.h"
+
 namespace voxkit {
 
 /// Voxel coordinates and extents: 64 bits, so that products of extents to 2^20 a side stay exact.
@@ -62,14 +64,14 @@ struct Voxel {
   std::array<std::byte, 4> bytes{};
   friend bool operator==(const Voxel&, const Voxel&) = default;
   template <class T>
-  static Voxel of(T value) {
+  VOX_HD static Voxel of(T value) {
     static_assert(sizeof(T) <= 4);
     Voxel v;
     std::memcpy(v.bytes.data(), &value, sizeof(T));
     return v;
   }
   template <class T>
-  T as() const {
+  VOX_HD T as() const {
     static_assert(sizeof(T) <= 4);
     T value;
     std::memcpy(&value, bytes.data(), sizeof(T));

@@ -54,6 +54,8 @@ class RayGenerator {
   glm::dvec3 direction(double x, double y) const;
   const glm::dvec3& eye() const { return eye_; }
   const glm::dvec3& forward() const { return forward_; }
+  const glm::dvec3& right() const { return right_; }
+  const glm::dvec3& up() const { return up_; }
   /// Width of a pixel at distance 1 along the axis: the cone of a ray is this wide at distance t times t.
   double pixel_width() const { return pixel_; }
 

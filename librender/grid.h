@@ -1,88 +1,119 @@
-// What a ray sees of a volume: `locate(voxel) -> {value, cell}`, the cell being the largest box known to hold
-// one value.
+// What a ray sees of a volume: `locate(voxel) -> {value, cell}`, the cell being the largest aligned cube
+// around the voxel that is known to hold one value.
 #pragma once
 
-#include <cstddef>
-#include <cstdint>
 #include <memory>
-#include <vector>
 
 #include "formats/context.h"
 #include "formats/copy.h"
 #include "formats/source.h"
-#include "libsvmm/svmm.h"
+#include "librender/ray.h"
+#include "libsvmm/walk.h"
 
 namespace voxkit::render {
 
-/// A box of voxels of one value, in base voxels, cut to the volume.
+/// Which way a grid is searched. path: keeps the path of blocks from the root. restart: searches from the
+/// root at every step (section 3.2.2, for GPUs).
+enum class Search { path, restart };
+
+/// A value and its cell: the aligned cube of edge 2^log2_edge around the voxel.
 struct Cell {
   Voxel value;
-  int64_t lo[3], hi[3];
+  int log2_edge;
+  VOX_HD_HOT bool leave(GridRay& ray) const { return ray.leave(log2_edge); }
 };
 
-/// A volume in memory; every cell is one voxel.
+/// The voxels of an uncompressed volume, on the host or a device.
+struct DenseView {
+  const std::byte* voxels;
+  int64_t width, height;  ///< in voxels
+  int bytes;              ///< of a voxel
+
+  VOX_HD_HOT Voxel at(int64_t x, int64_t y, int64_t z) const {
+    const std::byte* p = voxels + ((z * height + y) * width + x) * bytes;
+    switch (bytes) {
+      case 4:
+        return Voxel::of(load_le<uint32_t>(p));
+      case 2:
+        return Voxel::of(load_le<uint16_t>(p));
+      case 1:
+        return Voxel::of(load_le<uint8_t>(p));
+      default:
+        return Voxel::of(static_cast<uint32_t>(p[0]) | static_cast<uint32_t>(p[1]) << 8 |
+                         static_cast<uint32_t>(p[2]) << 16);
+    }
+  }
+  /// Nothing is remembered from one voxel to the next; every cell is one voxel.
+  struct Cursor {
+    const DenseView& view;
+    VOX_HD_HOT Cell locate(uint32_t x, uint32_t y, uint32_t z, int finest) {
+      (void)finest;
+      bytes_ += static_cast<uint32_t>(view.bytes);
+      return {view.at(x, y, z), 0};
+    }
+    VOX_HD_HOT static void start() {}
+    VOX_HD_HOT static uint32_t blocks() { return 0; }
+    VOX_HD_HOT uint32_t bytes() const { return bytes_; }
+    uint32_t bytes_ = 0;
+  };
+  VOX_HD_HOT Cursor cursor() const { return {*this}; }
+};
+
+/// A compressed volume, on the host or a device. Cells are terminal voxels; with a level of detail, also
+/// coarser ones.
+template <class Pools, Search search>
+struct SvmmView {
+  const svmm::View* view;
+  const Pools* pools;
+
+  class Cursor {
+   public:
+    VOX_HD_HOT explicit Cursor(const SvmmView& volume) : walk_(*volume.view, *volume.pools) {}
+    /// `finest`: cells of edge 2^finest are fine enough; -1: all detail.
+    VOX_HD_HOT Cell locate(uint32_t x, uint32_t y, uint32_t z, int finest) {
+      if (search == Search::restart) walk_.restart();
+      const auto found = walk_.locate(x, y, z, finest);
+      return {found.value, found.log2_edge};
+    }
+    VOX_HD_HOT static void start() {}
+    /// Blocks entered, and bytes of links and values looked at, so far.
+    VOX_HD_HOT uint32_t blocks() const { return walk_.blocks_entered(); }
+    VOX_HD_HOT uint32_t bytes() const { return walk_.bytes_read(); }
+
+   private:
+    svmm::Walk<Pools> walk_;
+  };
+  VOX_HD_HOT Cursor cursor() const { return Cursor(*this); }
+};
+
+/// A volume in memory.
 class DenseGrid {
  public:
   /// Reads all of `source`; the memory is reserved in ctx.memory for as long as the grid lives.
   static Result<std::shared_ptr<const DenseGrid>> read(VolumeSource& source, Context& ctx);
 
   const VolumeInfo& info() const { return info_; }
-  /// Nothing is remembered from one voxel to the next.
-  class Cursor {
-   public:
-    explicit Cursor(const DenseGrid& grid) : grid_(&grid) {}
-    /// `finest`: edge in voxels below which detail is not wanted; a dense volume has no coarser detail.
-    void locate(const int64_t (&v)[3], double finest, Cell& cell) {
-      (void)finest;
-      const int64_t index = (v[2] * grid_->info_.dims.y + v[1]) * grid_->info_.dims.x + v[0];
-      std::memcpy(cell.value.bytes.data(), grid_->voxels_ + index * grid_->bytes_,
-                  static_cast<size_t>(grid_->bytes_));
-      for (int a = 0; a < 3; ++a) cell.lo[a] = v[a], cell.hi[a] = v[a] + 1;
-    }
-    static uint64_t blocks() { return 0; }
-    static Status status() { return {}; }
-
-   private:
-    const DenseGrid* grid_;
-  };
+  DenseView view() const { return {buffer_->data(), info_.dims.x, info_.dims.y, voxel_bytes(info_.format)}; }
 
  private:
   VolumeInfo info_;
   std::unique_ptr<Buffer> buffer_;
-  const std::byte* voxels_ = nullptr;
-  int bytes_ = 0;
 };
 
-/// A compressed volume. Cells are terminal voxels; with a level of detail, also coarser ones.
+class VoidMemos;
+
+/// A compressed volume, drawn from its file.
 class SvmmGrid {
  public:
-  explicit SvmmGrid(std::shared_ptr<const svmm::Volume> volume) : volume_(std::move(volume)) {}
+  explicit SvmmGrid(std::shared_ptr<const svmm::Volume> volume);
   const VolumeInfo& info() const { return volume_->info(); }
-
-  /// Finds cells. Restart: every search begins at the root (section 3.2.2, for GPUs). Otherwise the path of
-  /// blocks from the root is kept, and a search begins at the smallest block that holds the voxel.
-  template <bool Restart>
-  class Cursor {
-   public:
-    explicit Cursor(const SvmmGrid& grid) : path_(*grid.volume_) {}
-    void locate(const int64_t (&v)[3], double finest, Cell& cell) {
-      if (Restart) path_.restart();
-      path_.locate({v[0], v[1], v[2]}, finest);
-      cell.value = path_.value();
-      const Box& box = path_.cell();
-      for (int a = 0; a < 3; ++a) cell.lo[a] = box.lo[a], cell.hi[a] = box.hi[a];
-    }
-    /// Blocks entered so far.
-    uint64_t blocks() const { return path_.blocks_entered(); }
-    /// What was wrong with the file, if anything was.
-    const Status& status() const { return path_.status(); }
-
-   private:
-    svmm::Path path_;
-  };
+  const svmm::Volume& volume() const { return *volume_; }
+  /// What was learned from earlier pictures.
+  VoidMemos& void_memos() const { return *void_memos_; }
 
  private:
   std::shared_ptr<const svmm::Volume> volume_;
+  std::shared_ptr<VoidMemos> void_memos_;
 };
 
 }  // namespace voxkit::render

@@ -11,8 +11,8 @@ namespace {
 /// The samples of a layer at a pixel of the frame.
 void sample(Layer layer, const Frame& frame, const RayGenerator& rays, const std::optional<Image>& normals,
             int x, int y, float* out) {
-  const Pixel& pixel =
-      frame.pixels[static_cast<size_t>(y) * static_cast<size_t>(frame.width) + static_cast<size_t>(x)];
+  const size_t index = static_cast<size_t>(y) * static_cast<size_t>(frame.width) + static_cast<size_t>(x);
+  const Pixel& pixel = frame.pixels[index];
   switch (layer) {
     case Layer::depth:
       out[0] = pixel.distance;
@@ -29,7 +29,7 @@ void sample(Layer layer, const Frame& frame, const RayGenerator& rays, const std
       break;
     }
     case Layer::steps:
-      out[0] = static_cast<float>(pixel.cells);
+      out[0] = static_cast<float>(frame.details[index].cells);
       break;
   }
 }

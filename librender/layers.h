@@ -14,7 +14,8 @@ namespace voxkit::render {
 enum class Layer { depth, normal, position, steps };
 
 /// A layer for every n x n pixels of a frame: what the pixel (n/2, n/2) of them found, since no mean of
-/// depths or normals is one. `normals` is needed for `normal` only. Errors: ErrorCode::limit.
+/// depths or normals is one. `normals` is needed for `normal` only, and the frame's details for `steps`.
+/// Errors: ErrorCode::limit.
 Result<ImageLayer> make_layer(Layer layer, const Frame& frame, const Camera& camera,
                               const std::optional<Image>& normals, int n, Context& ctx);
 

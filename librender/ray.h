@@ -2,122 +2,193 @@
 // names the problem).
 //
 // The plane x = p is reached at t = (p - origin) / direction. That is never accumulated: every decision
-// compares two such quotients, in doubles where they are far enough apart, else exactly. So a step over a
+// compares two such quotients, in doubles where these are far enough apart, else exactly. So a step over a
 // large cell lands in the very voxel that single steps would have reached, whatever the length of the way.
 #pragma once
 
 #include <cmath>
 #include <cstdint>
 
-#include "librender/hd.h"
+#include "librender/exact_ray.h"
 
 namespace voxkit::render {
 
-/// A ray in grid coordinates: voxel (i, j, k) is [i, i + 1) x [j, j + 1) x [k, k + 1). Components are
-/// mirrored so that no direction is negative. A ray that lies in a plane between voxels belongs to the voxels
-/// on its upper side.
+/// Where rays start, in grid coordinates: voxel (i, j, k) is [i, i + 1) x [j, j + 1) x [k, k + 1). Rays
+/// mirror axes about the middle of [0, side), side being a power of two, so that no direction is negative;
+/// voxels and aligned cells stay what they are under that. Here is each axis as it is, and mirrored.
+struct RayOrigin {
+  /// 1 <= dims <= 2^31. The origin is moved to a multiple of 2^-20; |origin| < 2^31.
+  VOX_HD RayOrigin(const double (&origin)[3], const int64_t (&dims)[3]) {
+    int64_t side = 1;
+    while (side < dims[0] || side < dims[1] || side < dims[2]) side *= 2;
+    mask = side - 1;
+    double reach = 0;  // bounds every coordinate on the way through the grid
+    for (int a = 0; a < 3; ++a) {
+      const double o = std::floor(origin[a] * 0x1p20 + 0.5) * 0x1p-20;
+      at[0][a] = o;
+      at[1][a] = static_cast<double>(side) - o;
+      near[0][a] = 0;
+      near[1][a] = side - dims[a];
+      far[0][a] = dims[a];
+      far[1][a] = side;
+      for (int m = 0; m < 2; ++m) {
+        to_near[m][a] = static_cast<double>(near[m][a]) - at[m][a];
+        to_far[m][a] = static_cast<double>(far[m][a]) - at[m][a];
+      }
+      const double bound = std::fabs(o) + 2 * static_cast<double>(side);
+      reach = bound > reach ? bound : reach;
+    }
+    clear = 0.5 - reach * 0x1p-48;
+  }
+  double at[2][3], to_near[2][3], to_far[2][3];
+  int64_t near[2][3], far[2][3];
+  double clear;  ///< positions at least this far from the middle of a voxel may be in the next
+  int64_t mask;  ///< side - 1
+};
+
+/// A ray on its way through a grid. One that lies in a plane between voxels belongs to the voxels on the
+/// upper side, as it goes; planes that are crossed at once are crossed in the order x, y, z.
 class GridRay {
  public:
-  /// Origins are multiples of 2^-20 with |origin| < 2^31: `quantise`. Components of the direction below
-  /// 2^-200 of the greatest are taken for zero; the direction must not be zero.
-  VOX_HD GridRay(const double (&origin)[3], const double (&direction)[3], const int64_t (&dims)[3]) {
-    double greatest = 0;
-    for (int a = 0; a < 3; ++a)
-      greatest = direction[a] > greatest ? direction[a] : -direction[a] > greatest ? -direction[a] : greatest;
+  /// The greatest component of the direction is between 2^-100 and 2^100; those below 2^-200 are taken for
+  /// zero.
+  VOX_HD_HOT GridRay(const RayOrigin& from, const double (&direction)[3]) : clear_(from.clear) {
     for (int a = 0; a < 3; ++a) {
-      dims_[a] = dims[a];
-      mirrored_[a] = direction[a] < 0;
-      origin_[a] = mirrored_[a] ? static_cast<double>(dims[a]) - origin[a] : origin[a];
-      direction_[a] = mirrored_[a] ? -direction[a] : direction[a];
-      if (direction_[a] < greatest * 0x1p-200) direction_[a] = 0;
-      inverse_[a] = direction_[a] > 0 ? 1 / direction_[a] : 0;
+      const int mirrored = direction[a] < 0 ? 1 : 0;
+      const double size = std::fabs(direction[a]);
+      direction_[a] = size < 0x1p-200 ? 0 : size;
+      inverse_[a] = 1 / direction_[a];  // infinite: never crosses
+      origin_[a] = from.at[mirrored][a];
+      near_[a] = from.near[mirrored][a];
+      to_near_[a] = from.to_near[mirrored][a];
+      to_far_[a] = from.to_far[mirrored][a];
+      far_[a] = from.far[mirrored][a];
+      flip_[a] = mirrored != 0 ? from.mask : 0;
     }
   }
-  VOX_HD static double quantise(double x) { return std::floor(x * 0x1p20 + 0.5) * 0x1p-20; }
 
-  /// Moves to the voxel in which the ray enters the grid, at `t` >= 0; false if it misses.
-  VOX_HD bool enter(double& t) {
-    int axis = -1;
+  /// Moves to the voxel in which the ray enters the grid, at t() >= 0; false if it misses.
+  VOX_HD_HOT bool enter() {
+    double t[3], end[3];
+    int beyond = 0;
     for (int a = 0; a < 3; ++a) {
-      voxel_[a] = static_cast<int64_t>(std::floor(origin_[a]));
-      if (origin_[a] >= static_cast<double>(dims_[a]) || (origin_[a] < 0 && direction_[a] == 0)) return false;
-      if (origin_[a] < 0 && (axis < 0 || before(axis, 0, a, 0))) axis = a;
+      t[a] = to_near_[a] > 0 ? to_near_[a] * inverse_[a] : -1;
+      end[a] = to_far_[a] * inverse_[a];
+      beyond |= to_far_[a] <= 0;
     }
-    t = 0;
-    if (axis < 0) return true;
-    advance_to(axis, 0);
-    t = time(axis, 0);
-    return inside();
-  }
-  /// Moves to the next voxel outside the cell lo <= v < hi around the current one, entered at `t`; false if
-  /// it leaves the grid.
-  VOX_HD bool leave(const int64_t (&lo)[3], const int64_t (&hi)[3], double& t) {
-    int axis = -1;
-    int64_t plane = 0;
+    const double first = greatest(t), t_end = least(end);
+    // Above what quotients up to the end of the grid are off by.
+    margin_ = t_end * 0x1p-48;
+    if (beyond != 0 || first > t_end + margin_) return false;
+    t_ = first > 0 ? first : 0;  // it may start inside
+    const double close = first - margin_;
+    const int candidates = (t[0] >= close) + (t[1] >= close) + (t[2] >= close);
+    int unclear = (first > t_end - margin_) | ((first > 0) & (candidates > 1));
     for (int a = 0; a < 3; ++a) {
-      if (direction_[a] == 0) continue;
-      const int64_t exit = mirrored_[a] ? dims_[a] - lo[a] : hi[a];
-      if (axis < 0 || before(a, exit, axis, plane)) axis = a, plane = exit;
+      const bool crossed = (t[a] > 0) & (t[a] == first);
+      const int64_t low = t[a] >= 0 ? near_[a] : static_cast<int64_t>(origin_[a]);
+      const Position x = position(a, low, far_[a]);
+      unclear |= static_cast<int>(x.unclear) & static_cast<int>(!crossed);
+      voxel_[a] = crossed ? near_[a] : x.voxel;
     }
-    if (hi[0] - lo[0] == 1 && hi[1] - lo[1] == 1 && hi[2] - lo[2] == 1)
-      voxel_[axis] = plane;
-    else
-      advance_to(axis, plane);
-    t = time(axis, plane);
-    last_axis_ = axis;
-    return voxel_[axis] < dims_[axis];
+    if (unclear != 0) {
+      ExactRay ray = exactly();
+      t_ = ray.enter();
+      for (int a = 0; a < 3; ++a) voxel_[a] = static_cast<int64_t>(ray.voxel[a]);
+    }
+    return t_ >= 0;
   }
+
+  /// Moves to the next voxel outside the aligned cell of edge 2^`log2_edge` (at most the grid's side) around
+  /// the current one, cut to the grid, entered at t(); false if it leaves the grid.
+  VOX_HD_HOT bool leave(int log2_edge) {
+    const int64_t within = (int64_t{1} << log2_edge) - 1;
+    int64_t plane[3];
+    for (int a = 0; a < 3; ++a) {
+      const int64_t end = (voxel_[a] | within) + 1;
+      plane[a] = end < far_[a] ? end : far_[a];
+    }
+    return cross(plane, log2_edge > 0);
+  }
+  /// The same for the box lo <= v < hi around the current voxel and inside the grid.
+  VOX_HD_HOT bool leave(const uint32_t (&lo)[3], const uint32_t (&hi)[3]) {
+    int64_t plane[3];
+    for (int a = 0; a < 3; ++a) plane[a] = flip_[a] != 0 ? flip_[a] + 1 - int64_t{lo[a]} : hi[a];
+    return cross(plane, true);
+  }
+
   /// The current voxel.
-  VOX_HD int64_t voxel(int a) const { return mirrored_[a] ? dims_[a] - 1 - voxel_[a] : voxel_[a]; }
-  /// The axis of the face through which the current voxel was entered; -1 at the start inside the grid.
-  VOX_HD int last_axis() const { return last_axis_; }
+  VOX_HD_HOT uint32_t voxel(int a) const { return static_cast<uint32_t>(voxel_[a] ^ flip_[a]); }
+  /// When it was entered.
+  VOX_HD_HOT double t() const { return t_; }
 
  private:
-  VOX_HD double time(int a, int64_t plane) const {
+  VOX_HD_HOT static double least(const double (&t)[3]) {
+    const double two = t[0] < t[1] ? t[0] : t[1];
+    return t[2] < two ? t[2] : two;
+  }
+  VOX_HD_HOT static double greatest(const double (&t)[3]) {
+    const double two = t[0] > t[1] ? t[0] : t[1];
+    return t[2] > two ? t[2] : two;
+  }
+  VOX_HD_HOT double time(int a, int64_t plane) const {
     return (static_cast<double>(plane) - origin_[a]) * inverse_[a];
   }
-
-  /// Whether plane p of axis a is crossed before plane q of axis b. Crossed at once, the lower axis comes
-  /// first.
-  VOX_HD bool before(int a, int64_t p, int b, int64_t q) const {
-    const double t = time(a, p), u = time(b, q);
-    const double margin = 0x1p-49 * (std::fabs(t) + std::fabs(u));
-    if (t < u - margin) return true;
-    if (t > u + margin) return false;
-    // (p - o_a) / d_a < (q - o_b) / d_b, without rounding: both differences are exact, and so are the
-    // products as sums of two.
-    const double pa = static_cast<double>(p) - origin_[a], qb = static_cast<double>(q) - origin_[b];
-    const double left = pa * direction_[b], right = qb * direction_[a];
-    if (left != right) return left < right;
-    const double left_rest = std::fma(pa, direction_[b], -left),
-                 right_rest = std::fma(qb, direction_[a], -right);
-    if (left_rest != right_rest) return left_rest < right_rest;
-    return a < b;
+  /// The coordinate a, known to be in lo .. hi - 1, at t_; unclear where that is too close to a plane to
+  /// tell.
+  struct Position {
+    int64_t voxel;
+    bool unclear;
+  };
+  VOX_HD_HOT Position position(int a, int64_t lo, int64_t hi) const {
+    const double x = origin_[a] + direction_[a] * t_;
+    const int64_t whole = static_cast<int64_t>(x);
+    const int64_t above = whole < lo ? lo : whole;
+    return {above < hi ? above : hi - 1, std::fabs(x - static_cast<double>(whole) - 0.5) > clear_};
   }
-  /// The crossing of `plane` on `axis` has just happened: sets all coordinates to the planes crossed by then.
-  VOX_HD void advance_to(int axis, int64_t plane) {
-    const double t = time(axis, plane);
-    for (int b = 0; b < 3; ++b) {
-      if (b == axis || direction_[b] == 0) continue;
-      int64_t v = static_cast<int64_t>(std::floor(origin_[b] + direction_[b] * t));
-      v = v < voxel_[b] ? voxel_[b] : v;
-      while (before(b, v + 1, axis, plane)) ++v;
-      while (v > voxel_[b] && !before(b, v, axis, plane)) --v;
-      voxel_[b] = v;
+  /// Crosses the first of three planes in the way. Which one that is cannot be foreseen, so nothing branches
+  /// on it. `far`: the other coordinates may change on the way there.
+  VOX_HD_HOT bool cross(const int64_t (&plane)[3], bool far) {
+    double t[3];
+    for (int a = 0; a < 3; ++a) t[a] = time(a, plane[a]);
+    t_ = least(t);
+    const double close = t_ + margin_;
+    int unclear = (t[0] <= close) + (t[1] <= close) + (t[2] <= close) > 1;
+    int64_t next[3];
+    if (far) {
+      for (int a = 0; a < 3; ++a) {
+        const bool crossed = t[a] == t_;
+        const Position x = position(a, voxel_[a], plane[a]);
+        unclear |= static_cast<int>(x.unclear) & static_cast<int>(!crossed);
+        next[a] = crossed ? plane[a] : x.voxel;
+      }
+    } else {
+      for (int a = 0; a < 3; ++a) next[a] = t[a] == t_ ? plane[a] : voxel_[a];
     }
-    voxel_[axis] = plane;
-    last_axis_ = axis;
+    if (unclear != 0) {
+      ExactRay ray = exactly();
+      t_ = ray.cross(static_cast<double>(plane[0]), static_cast<double>(plane[1]),
+                     static_cast<double>(plane[2]));
+      for (int a = 0; a < 3; ++a) next[a] = static_cast<int64_t>(ray.voxel[a]);
+    }
+    for (int a = 0; a < 3; ++a) voxel_[a] = next[a];
+    return ((voxel_[0] < far_[0]) & (voxel_[1] < far_[1]) & (voxel_[2] < far_[2])) != 0;
   }
-  VOX_HD bool inside() const {
-    for (int a = 0; a < 3; ++a)
-      if (voxel_[a] < 0 || voxel_[a] >= dims_[a]) return false;
-    return true;
+  VOX_HD_HOT ExactRay exactly() const {
+    ExactRay ray;
+    for (int a = 0; a < 3; ++a) {
+      ray.origin[a] = origin_[a];
+      ray.direction[a] = direction_[a];
+      ray.near[a] = static_cast<double>(near_[a]);
+      ray.far[a] = static_cast<double>(far_[a]);
+      ray.voxel[a] = static_cast<double>(voxel_[a]);
+    }
+    return ray;
   }
 
-  double origin_[3], direction_[3], inverse_[3];
-  int64_t dims_[3], voxel_[3];
-  bool mirrored_[3];
-  int last_axis_ = -1;
+  double origin_[3], direction_[3], inverse_[3], to_near_[3], to_far_[3];
+  double t_ = 0, margin_ = 0, clear_;
+  int64_t voxel_[3] = {}, near_[3], far_[3], flip_[3];
 };
 
 }  // namespace voxkit::render

@@ -2,29 +2,24 @@
 // and 3.3).
 #pragma once
 
-#include <limits>
 #include <vector>
 
 #include "librender/camera.h"
 #include "librender/grid.h"
+#include "librender/pixel.h"
 
 namespace voxkit::render {
-
-/// What a ray found.
-struct Pixel {
-  float colour[4] = {};                                     ///< R, G, B times opacity, and opacity; 0..1
-  float distance = std::numeric_limits<float>::infinity();  ///< from the eye to the first voxel that is not
-                                                            ///< void, world units
-  int32_t voxel[3] = {-1, -1, -1};                          ///< that voxel; of a coarser cell its first
-  uint32_t cells = 0;                                       ///< cells looked at
-};
 
 /// The pixels of a picture before shading, row by row from the top, and what they cost.
 struct Frame {
   int width = 0, height = 0;
   std::vector<Pixel> pixels;
-  uint64_t rays = 0, rays_hit = 0, cells_visited = 0, blocks_touched = 0;
-  double seconds = 0;  ///< of casting alone
+  std::vector<PixelDetail> details;  ///< as many, or none
+  uint64_t rays = 0, rays_hit = 0;
+  uint64_t cells_visited = 0;   ///< of one value each, whatever their size
+  uint64_t blocks_touched = 0;  ///< times that a block was entered
+  uint64_t bytes_touched = 0;   ///< of links and values looked at
+  double seconds = 0;           ///< of casting alone
 };
 
 /// path: keeps the path of blocks from the root. restart: searches from the root at every step
@@ -36,14 +31,18 @@ struct CastOptions {
   int width = 1024, height = 768;
   Traversal traversal = Traversal::path;
   bool level_of_detail = false;  ///< stop at voxels no larger than a pixel's cone (section 3.2.4)
+  bool details = false;          ///< fill Frame::details
+  bool skip = true;              ///< step over cells; else voxel by voxel, to see what skipping saves
   /// Stored values that a scalar volume shows as 0 and 1, its colour being (d, d, d, d) (section 4.1).
   ValueRange range{0, 255};
 };
 
 /// One ray through each pixel's centre. Opacity is per length: a cell of opacity a that is crossed over n
 /// base voxels covers 1 - (1 - a)^n, so skipping changes nothing; a ray ends at 99.5 %. The pixels do not
-/// depend on ctx.threads.
-Result<Frame> cast(const DenseGrid& grid, const Camera& camera, const CastOptions& options, Context& ctx);
-Result<Frame> cast(const SvmmGrid& grid, const Camera& camera, const CastOptions& options, Context& ctx);
+/// depend on ctx.threads. `frame` is overwritten; its memory is used again.
+Status cast(const DenseGrid& grid, const Camera& camera, const CastOptions& options, Frame& frame,
+            Context& ctx);
+Status cast(const SvmmGrid& grid, const Camera& camera, const CastOptions& options, Frame& frame,
+            Context& ctx);
 
 }  // namespace voxkit::render

@@ -4,6 +4,8 @@
 #include <array>
 #include <cstring>
 
+#include "libsvmm/base_voxel.h"
+
 #define STB_DXT_IMPLEMENTATION
 #define STB_DXT_STATIC
 #pragma GCC diagnostic push
@@ -25,11 +27,6 @@ bool occupied(const std::byte* v, VoxelFormat f) {
   if (f == VoxelFormat::rgba32) return v[3] != std::byte{0};
   if (f == VoxelFormat::float32) return load_le<float>(v) != 0;
   return std::any_of(v, v + voxel_bytes(f), [](std::byte b) { return b != std::byte{0}; });
-}
-
-/// Bytes of the value that the voxels of a subblock share.
-int shared_bytes(VoxelFormat f) {
-  return is_colour(f) ? 3 : voxel_bytes(f);
 }
 
 /// The rounded mean of the occupied voxels of a subblock: colour without alpha, or the scalar.
@@ -64,26 +61,10 @@ int luma(const std::byte* rgb) {
   return (13933 * u8(rgb[0]) + 46871 * u8(rgb[1]) + 4732 * u8(rgb[2]) + 32768) >> 16;
 }
 
-// ---- S3TC (BC1, "DXT1"): 4x4 pixels in 8 bytes: two RGB565 end points and sixteen 2-bit indices. If the
-// first end point is greater as a number there are four opaque colours; else three, and index 3 is void.
-
-using Palette = std::array<std::array<int, 3>, 4>;
-
-std::array<int, 3> expand_565(unsigned c) {
-  const int r = static_cast<int>(c >> 11 & 31), g = static_cast<int>(c >> 5 & 63),
-            b = static_cast<int>(c & 31);
-  return {r << 3 | r >> 2, g << 2 | g >> 4, b << 3 | b >> 2};
-}
+using Palette = std::array<Bc1Colour, 4>;
 
 Palette bc1_palette(unsigned c0, unsigned c1) {
-  Palette p{};
-  p[0] = expand_565(c0);
-  p[1] = expand_565(c1);
-  for (size_t k = 0; k < 3; ++k) {
-    p[2][k] = c0 > c1 ? (2 * p[0][k] + p[1][k]) / 3 : (p[0][k] + p[1][k]) / 2;
-    p[3][k] = c0 > c1 ? (p[0][k] + 2 * p[1][k]) / 3 : 0;
-  }
-  return p;
+  return {bc1_colour(c0, c1, 0), bc1_colour(c0, c1, 1), bc1_colour(c0, c1, 2), bc1_colour(c0, c1, 3)};
 }
 
 /// `rgba`: 16 pixels, alpha 0 = void.
@@ -120,7 +101,7 @@ void encode_bc1(std::array<uint8_t, 64> rgba, std::byte* out) {
       for (uint32_t j = 0; j < 3 && !is_void[i]; ++j) {
         int distance = 0;
         for (size_t k = 0; k < 3; ++k) {
-          const int d = palette[j][k] - rgba[4 * i + k];
+          const int d = palette[j].rgb[k] - rgba[4 * i + k];
           distance += d * d;
         }
         if (distance < best_distance) best_distance = distance, best = j;
@@ -253,7 +234,7 @@ void decode_base_block(const std::byte* block, Index3 size, VoxelFormat f, Base 
       }
       const uint32_t index = indices >> (2 * i) & 3;
       std::byte* v = voxels + voxel * stride;
-      for (int k = 0; k < 3; ++k) v[k] = static_cast<std::byte>(palette[index][static_cast<size_t>(k)]);
+      for (int k = 0; k < 3; ++k) v[k] = static_cast<std::byte>(palette[index].rgb[k]);
       set_alpha(v, three && index == 3 ? 0 : 255);
     });
   } else {
@@ -270,45 +251,6 @@ void decode_base_block(const std::byte* block, Index3 size, VoxelFormat f, Base 
       block += base == Base::alpha ? 8 : 1;
     }
   }
-}
-
-Voxel decode_base_voxel(const std::byte* block, Index3 size, Index3 v, VoxelFormat f, Base base,
-                        Layout layout, const Voxel& parent) {
-  const int64_t index = voxel_index(v, size), subblock = index / 8;
-  const int i = static_cast<int>(index % 8);
-  Voxel voxel;
-  const auto colour = [&](int r, int g, int b, int alpha) {
-    voxel.bytes = {static_cast<std::byte>(r), static_cast<std::byte>(g), static_cast<std::byte>(b),
-                   std::byte{0}};
-    if (f == VoxelFormat::rgba32) voxel.bytes[3] = static_cast<std::byte>(alpha);
-  };
-  if (f == VoxelFormat::bitmap) {
-    voxel.bytes[0] = block[subblock] >> i & std::byte{1};
-  } else if (base == Base::raw && layout == Layout::plain) {
-    std::memcpy(voxel.bytes.data(), block + index * voxel_bytes(f), static_cast<size_t>(voxel_bytes(f)));
-  } else if (base == Base::raw) {
-    voxel = thesis_value(load_word(block + index * word_bytes(f), f), f);
-  } else if (base == Base::gray) {
-    const int l = u8(block[index]);
-    if (l != 0) colour(l, l, l, 255);
-  } else if (base == Base::bc1) {
-    const int64_t tile = (v.z * (size.y / 4) + v.y / 4) * (size.x / 4) + v.x / 4;
-    const std::byte* p = block + tile * 8;
-    const unsigned c0 = load_le<uint16_t>(p), c1 = load_le<uint16_t>(p + 2);
-    const uint32_t pixel = load_le<uint32_t>(p + 4) >> (2 * (v.y % 4 * 4 + v.x % 4)) & 3;
-    const Palette palette = bc1_palette(c0, c1);
-    const auto& c = palette[pixel];
-    if (c0 > c1 || pixel != 3) colour(c[0], c[1], c[2], 255);
-  } else {
-    const int shared = colour_from_parent(size) ? 0 : shared_bytes(f);
-    const std::byte* here = block + subblock * (shared + (base == Base::alpha ? 8 : 1));
-    const int alpha = base == Base::alpha ? u8(here[shared + i]) : (u8(here[shared]) >> i & 1) * 255;
-    if (alpha == 0) return voxel;
-    std::memcpy(voxel.bytes.data(), shared ? here : parent.bytes.data(),
-                static_cast<size_t>(shared_bytes(f)));
-    if (f == VoxelFormat::rgba32) voxel.bytes[3] = static_cast<std::byte>(alpha);
-  }
-  return voxel;
 }
 
 }  // namespace voxkit::svmm

@@ -21,8 +21,4 @@ void encode_base_block(const std::byte* voxels, Index3 size, VoxelFormat f, Base
 void decode_base_block(const std::byte* block, Index3 size, VoxelFormat f, Base base, Layout layout,
                        const Voxel& parent, std::byte* voxels);
 
-/// The voxel at `v` of one block, as decode_base_block would write it.
-Voxel decode_base_voxel(const std::byte* block, Index3 size, Index3 v, VoxelFormat f, Base base,
-                        Layout layout, const Voxel& parent);
-
 }  // namespace voxkit::svmm

@@ -8,16 +8,29 @@
 
 namespace voxkit::svmm {
 
-Result<const std::byte*> Volume::Store::block(const Volume& volume, size_t level, uint64_t number) const {
-  const Level& info = volume.levels_[level];
+Result<const std::byte*> Store::block(const Volume& volume, size_t level, uint64_t number) const {
   const LevelStore& store = levels[level];
-  if (number >= info.blocks)
+  if (number >= store.blocks)
     return bad_input(
-        volume.container_->name(),
-        fmt::format("level {}: a link to block {}: expected a number below {}", level, number, info.blocks));
-  const uint64_t first = number >> store.chunk_log2 << store.chunk_log2;
-  VOX_TRY(const auto bytes, volume.container_->chunk(store.chunks[number >> store.chunk_log2]));
-  return bytes.data() + (number - first) * info.block_bytes;
+        volume.container().name(),
+        fmt::format("level {}: a link to block {}: expected a number below {}", level, number, store.blocks));
+  const uint64_t chunk = number >> store.chunk_log2;
+  VOX_TRY(const auto bytes, volume.container().chunk(store.chunks[chunk]));
+  store.found[chunk].store(bytes.data(), std::memory_order_release);
+  return bytes.data() + (number - (chunk << store.chunk_log2)) * store.block_bytes;
+}
+
+const std::byte* Store::block_or_null(const Volume& volume, int level, uint64_t number) const {
+  const auto bytes = block(volume, static_cast<size_t>(level), number);
+  if (bytes) return *bytes;
+  const std::lock_guard lock(mutex_);
+  if (status_) status_ = tl::unexpected<Error>(bytes.error());
+  return nullptr;
+}
+
+Status Store::status() const {
+  const std::lock_guard lock(mutex_);
+  return status_;
 }
 
 Status Volume::check(Context& ctx) const {

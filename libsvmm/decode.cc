@@ -5,6 +5,7 @@
 #include <cmath>
 
 #include "libsvmm/base_block.h"
+#include "libsvmm/base_voxel.h"
 #include "libsvmm/store.h"
 
 namespace voxkit::svmm {
@@ -12,6 +13,35 @@ namespace {
 
 Index3 ceil_divide(Index3 v, int64_t by) {
   return (v + Index3(by - 1)) / Index3(by);
+}
+
+View make_view(const VolumeInfo& info, const Params& params, std::span<const Level> levels) {
+  View view;
+  view.root = static_cast<int>(levels.size()) - 1;
+  view.format = info.format;
+  view.layout = params.layout;
+  view.base = params.base;
+  view.value_bytes = value_bytes(info.format);
+  while (int64_t{1} << view.log2_side < std::max({info.dims.x, info.dims.y, info.dims.z})) ++view.log2_side;
+  for (size_t k = 0; k < levels.size(); ++k) {
+    const Level& level = levels[k];
+    const Index3 size = level.blockwidth ? Index3(level.blockwidth) : level.dims;
+    // In the layout of the thesis a link is spread over the eight words of a subblock.
+    const int lookup = params.layout == Layout::thesis ? (k > 0 ? 8 : 1) * word_bytes(info.format)
+                                                       : value_bytes(info.format) + (k > 0 ? 8 : 0);
+    view.levels[k] = {std::countr_zero(level.mip_factor),
+                      level.blockwidth ? level.blockwidth - 1 : ~0u,
+                      size.x / 2,
+                      size.x / 2 * (size.y / 2),
+                      size,
+                      static_cast<uint32_t>(lookup)};
+  }
+  for (size_t b = 0; b < std::size(view.level_of_bits); ++b) {
+    size_t k = 0;
+    while (k + 1 < levels.size() && static_cast<size_t>(view.levels[k + 1].shift) < b) ++k;
+    view.level_of_bits[b] = static_cast<uint8_t>(k);
+  }
+  return view;
 }
 
 }  // namespace
@@ -46,6 +76,8 @@ Result<std::shared_ptr<const Volume>> Volume::open(std::shared_ptr<const Contain
     const Level& level = volume->levels_[k];
     stores[k].chunk_log2 = blocks_per_chunk_log2(level.block_bytes);
     stores[k].size = level.blockwidth ? Index3(level.blockwidth) : level.dims;
+    stores[k].blocks = level.blocks;
+    stores[k].block_bytes = level.block_bytes;
     std::vector<size_t>& chunks = stores[k].chunks;
     std::stable_sort(chunks.begin(), chunks.end(),
                      [&](size_t a, size_t b) { return table[a].part < table[b].part; });
@@ -68,6 +100,9 @@ Result<std::shared_ptr<const Volume>> Volume::open(std::shared_ptr<const Contain
     if (rest != 0)
       return bad_input(file, fmt::format("table: level {} lacks {} of its {} blocks", k, rest, level.blocks));
   }
+  for (auto& level : stores)
+    level.found = std::make_unique<std::atomic<const std::byte*>[]>(level.chunks.size());
+  volume->store_->view = make_view(volume->info_, volume->params_, volume->levels_);
   volume->container_ = std::move(container);
   return volume;
 }

@@ -11,7 +11,6 @@ namespace voxkit::svmm {
 namespace {
 
 constexpr size_t params_bytes = 64, level_bytes = 64;
-constexpr size_t max_levels = 33;  // every level halves a side of at most 2^31, down to 1, rounded up to even
 
 bool reaches_root(Index3 dims, const Params& params) {
   const int64_t least = std::min({dims.x, dims.y, dims.z}), greatest = std::max({dims.x, dims.y, dims.z});
@@ -145,7 +144,7 @@ Result<ParamsAndLevels> unpack_params(std::span<const std::byte> bytes, const Vo
   params.bound = static_cast<Bound>(field(2));
   params.alpha_weight = field(3) == 1;
   const auto count = load_le<uint32_t>(&bytes[4]);
-  if (count < 1 || count > max_levels || bytes.size() != params_bytes + count * level_bytes)
+  if (count < 1 || count > uint32_t{max_levels} || bytes.size() != params_bytes + count * level_bytes)
     return bad(4, fmt::format("{} levels in a chunk of {} bytes: expected 64 bytes and 64 a level", count,
                               bytes.size()));
   if (count == 1 && params.base != Base::raw)

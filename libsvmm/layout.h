@@ -41,7 +41,7 @@ struct Link {
   uint64_t first = 0;  ///< below 2^56 (plain) or 2^32 (thesis)
   uint8_t mask = 0;    ///< bit i: voxel i has a block
   /// Block of non-terminal voxel i: first plus the number of non-terminal voxels before it.
-  uint64_t child(int i) const {
+  VOX_HD uint64_t child(int i) const {
     return first + static_cast<unsigned>(std::popcount(mask & ((1u << i) - 1u)));
   }
   int children() const { return std::popcount(mask); }
@@ -51,7 +51,7 @@ struct Link {
 inline uint64_t pack_link(Link link) {
   return link.first | uint64_t{link.mask} << 56;
 }
-inline Link unpack_link(uint64_t bits) {
+VOX_HD inline Link unpack_link(uint64_t bits) {
   return {bits & ((uint64_t{1} << 56) - 1), static_cast<uint8_t>(bits >> 56)};
 }
 
@@ -72,7 +72,7 @@ inline uint32_t thesis_word(const Voxel& value, VoxelFormat f, Link link, int i)
   return byte(0) << 24 | byte(1) << 16 | byte(2) << 8 | static_cast<uint32_t>(alpha_to_3_bits(alpha)) << 5 |
          structure;
 }
-inline Voxel thesis_value(uint32_t word, VoxelFormat f) {
+VOX_HD inline Voxel thesis_value(uint32_t word, VoxelFormat f) {
   Voxel v;
   if (f == VoxelFormat::density8) {
     v.bytes[0] = static_cast<std::byte>(word >> 8);
@@ -82,7 +82,7 @@ inline Voxel thesis_value(uint32_t word, VoxelFormat f) {
   if (f == VoxelFormat::rgba32) v.bytes[3] = static_cast<std::byte>(alpha_from_3_bits(word >> 5 & 7));
   return v;
 }
-inline uint32_t load_word(const std::byte* p, VoxelFormat f) {
+VOX_HD inline uint32_t load_word(const std::byte* p, VoxelFormat f) {
   return is_colour(f) ? load_le<uint32_t>(p) : load_le<uint16_t>(p);
 }
 inline void store_word(std::byte* p, VoxelFormat f, uint32_t word) {
@@ -97,8 +97,8 @@ struct StructuralBlock {
   VoxelFormat format;
   Layout layout;
 
-  int64_t subblocks() const { return size.x * size.y * size.z / 8; }
-  Link link(int64_t subblock) const {
+  VOX_HD int64_t subblocks() const { return size.x * size.y * size.z / 8; }
+  VOX_HD Link link(int64_t subblock) const {
     if (layout == Layout::plain) return unpack_link(load_le<uint64_t>(links() + subblock * 8));
     Link link;
     for (int i = 0; i < 8; ++i) {
@@ -108,7 +108,7 @@ struct StructuralBlock {
     }
     return link;
   }
-  Voxel value(int64_t voxel) const {
+  VOX_HD Voxel value(int64_t voxel) const {
     if (layout == Layout::thesis)
       return thesis_value(load_word(bytes + voxel * word_bytes(format), format), format);
     // Four bytes are always there, since the links follow: one load, where a copy of 1 to 4 bytes would be a
@@ -118,7 +118,7 @@ struct StructuralBlock {
   }
 
  private:
-  const std::byte* links() const { return bytes + subblocks() * 8 * value_bytes(format); }
+  VOX_HD const std::byte* links() const { return bytes + subblocks() * 8 * value_bytes(format); }
 };
 uint64_t structural_block_bytes(uint64_t voxels, VoxelFormat f, Layout layout);
 
@@ -127,7 +127,7 @@ uint64_t structural_block_bytes(uint64_t voxels, VoxelFormat f, Layout layout);
 int blocks_per_chunk_log2(uint64_t block_bytes);
 
 /// BITMAP values above the base level are coverage: decoded to 1 from 128 on.
-inline Voxel decoded_value(const Voxel& value, VoxelFormat f) {
+VOX_HD inline Voxel decoded_value(const Voxel& value, VoxelFormat f) {
   return f == VoxelFormat::bitmap ? Voxel::of<uint8_t>(value.as<uint8_t>() >= 128) : value;
 }
 

@@ -21,6 +21,8 @@
 
 namespace voxkit::svmm {
 
+struct Store;
+
 /// Which bits a level is stored in.
 enum class Layout : uint8_t {
   thesis = 1,  ///< Table 2.1: 32 or 16 bit words that share value, terminal flag and block offset; 3-bit
@@ -44,6 +46,8 @@ enum class Bound : uint8_t {
 
 /// Largest block width: 2^10.
 inline constexpr int max_blockwidth = 1024;
+/// Every level halves a side of at most 2^31, down to 1, rounded up to even.
+inline constexpr int max_levels = 33;
 
 struct Params {
   Layout layout = Layout::plain;
@@ -95,6 +99,8 @@ class Volume {
   const Params& params() const { return params_; }
   const std::vector<Level>& levels() const { return levels_; }
   const Container& container() const { return *container_; }
+  /// The blocks, for walks (walk.h).
+  const Store& store() const { return *store_; }
   /// ceil(dims / mip_factor): the volume as seen at a level.
   Index3 dims_at(int level) const;
 
@@ -110,46 +116,12 @@ class Volume {
 
  private:
   Volume();
-  struct Store;
   friend struct Decoder;
-  friend class Path;
   std::shared_ptr<const Container> container_;
   VolumeInfo info_;
   Params params_;
   std::vector<Level> levels_;
   std::unique_ptr<Store> store_;
-};
-
-/// A walk through a volume that remembers the blocks between the root and where it is, for neighbouring
-/// voxels (rays; section 3.1.1). A damaged file makes cells void and is told by `status`.
-class Path {
- public:
-  explicit Path(const Volume& volume);
-  /// Forgets all but the root.
-  void restart() { level_ = root_; }
-  /// Finds the terminal voxel that covers base voxel `v` (inside the volume), or the first one on the way
-  /// whose edge is at most `finest` base voxels (0: all detail).
-  void locate(Index3 v, double finest);
-  /// What was found: the voxel as decoded, its box in base voxels, cut to the volume.
-  const Voxel& value() const { return value_; }
-  const Box& cell() const { return cell_; }
-  uint64_t blocks_entered() const { return blocks_entered_; }
-  const Status& status() const { return status_; }
-
- private:
-  struct Step {
-    const std::byte* block = nullptr;
-    Index3 origin{0};  ///< of the block, in voxels of its level
-    Voxel parent;      ///< undecoded value of its equivalent voxel
-  };
-  const Volume* volume_;
-  int root_, level_;  ///< of the innermost block of the path
-  std::array<Step, 33> steps_;
-  std::array<int, 33> shift_;  ///< log2 of the mip factors
-  Voxel value_;
-  Box cell_;
-  uint64_t blocks_entered_ = 0;
-  Status status_;
 };
 
 /// A compressed volume as a source, at a mip level; info() has that level's dims, spacing and origin.

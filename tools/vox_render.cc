@@ -35,10 +35,11 @@ struct Options {
   OpenOptions open;
   int width = 1024, height = 768;
   std::string camera = "orbit:30,20,1.8", mode = "surface", traversal = "path", shade = "phong", lod = "off",
-              device = "cpu";
+              skip = "on", device = "cpu";
   bool depth_antialias = false;
   int rays_a_side = 1;  ///< of a pixel
   std::vector<Layer> layers;
+  bool wants(Layer layer) const { return std::find(layers.begin(), layers.end(), layer) != layers.end(); }
   double fov = 45;
   std::optional<ValueRange> range;
   bool no_images = false;
@@ -115,6 +116,8 @@ void declare(CommandLine& line, Options& o) {
       "the ray at the pixel's centre",
       [&o](const std::string& text) { return parse_layers(text, o.layers); });
   line.option("--lod", "on|off", "Stop at voxels as small as a pixel (off)", one_of(o.lod, {"on", "off"}));
+  line.option("--skip", "on|off", "Step over whole cells of one value; off: voxel by voxel (on)",
+              one_of(o.skip, {"on", "off"}));
   line.option("--device", "DEVICE", "Where to render: cpu (cpu)", one_of(o.device, {"cpu", "cuda"}));
   declare_range_option(line, o.range,
                        "Sample values that are shown as 0 and 1 (default: full scale, or measured)");
@@ -132,9 +135,10 @@ struct Scene {
   std::shared_ptr<const DenseGrid> dense;
   ValueRange range{0, 255};
 
-  Result<Frame> draw(const Camera& camera, CastOptions options, Context& ctx) const {
+  Status draw(const Camera& camera, CastOptions options, Frame& frame, Context& ctx) const {
     options.range = range;
-    return compressed ? cast(*compressed, camera, options, ctx) : cast(*dense, camera, options, ctx);
+    return compressed ? cast(*compressed, camera, options, frame, ctx)
+                      : cast(*dense, camera, options, frame, ctx);
   }
 };
 
@@ -179,7 +183,8 @@ class Held {
   static Result<Held> for_frames(const Options& o, bool pictures, Context& ctx) {
     const uint64_t pixels = static_cast<uint64_t>(o.width) * static_cast<uint64_t>(o.height);
     const uint64_t rays = pixels * static_cast<uint64_t>(o.rays_a_side * o.rays_a_side);
-    const uint64_t frames = rays * sizeof(Pixel) * (o.reference.empty() ? 1 : 2);
+    const uint64_t ray_bytes = sizeof(Pixel) + (o.wants(Layer::steps) ? sizeof(PixelDetail) : 0);
+    const uint64_t frames = rays * ray_bytes * (o.reference.empty() ? 1 : 2);
     constexpr uint64_t written_bytes = (4 + 3 + 3 + 8) * sizeof(float);  // a pixel: floats, integers, layers
     const uint64_t rest = pictures ? rays * shading_bytes + pixels * written_bytes : 0;
     const std::string what =
@@ -217,6 +222,7 @@ struct Costs {
         .set("rays_hit", frame.rays_hit)
         .set("samples", uint64_t{0});
     json.set("cells_visited", frame.cells_visited).set("blocks_touched", frame.blocks_touched);
+    json.set("bytes_touched", frame.bytes_touched);
     frames.push(std::move(json));
   }
   void write(Json& json) {
@@ -268,7 +274,7 @@ Result<int> work(const Options& o, Run& run) {
   }
   if (!o.report.empty()) VOX_CHECK(check_output(o.report, run.options.force));
 
-  const bool normals = std::find(o.layers.begin(), o.layers.end(), Layer::normal) != o.layers.end();
+  const bool normals = o.wants(Layer::normal);
   const bool pictures = !names.empty() || !o.reference.empty();
   VOX_TRY(const Held frames, Held::for_frames(o, pictures, run.ctx));
   CastOptions cast_options;
@@ -278,6 +284,8 @@ Result<int> work(const Options& o, Run& run) {
                            : o.traversal == "baseline" ? Traversal::baseline
                                                        : Traversal::path;
   cast_options.level_of_detail = o.lod == "on";
+  cast_options.skip = o.skip == "on";
+  cast_options.details = o.wants(Layer::steps);
   ShadeOptions shade_options;
   shade_options.phong = o.shade.find("phong") != std::string::npos;
   shade_options.ssao = o.shade.find("ssao") != std::string::npos;
@@ -303,10 +311,11 @@ Result<int> work(const Options& o, Run& run) {
 
   run.stage("render");
   Costs costs, other_costs;
+  Frame frame, expected;  // their memory serves all frames
   double rmse = 0, psnr = 0, ms_ssim = 0;
   const double count = static_cast<double>(cameras.size());
   for (size_t i = 0; i < cameras.size(); ++i) {
-    VOX_TRY(const Frame frame, scene.draw(cameras[i], cast_options, run.ctx));
+    VOX_CHECK(scene.draw(cameras[i], cast_options, frame, run.ctx));
     Json json = Json::object();
     std::optional<Image> picture;
     if (pictures) {
@@ -325,7 +334,7 @@ Result<int> work(const Options& o, Run& run) {
       CastOptions dense_options = cast_options;
       if (other->compressed && dense_options.traversal == Traversal::baseline)
         dense_options.traversal = Traversal::path;
-      VOX_TRY(const Frame expected, other->draw(cameras[i], dense_options, run.ctx));
+      VOX_CHECK(other->draw(cameras[i], dense_options, expected, run.ctx));
       VOX_TRY(const Picture floats, shaded(expected, cameras[i], false));
       VOX_TRY(const Image reference, image_of(floats.rgba, run.ctx));
       VOX_TRY(const ImageDiff diff, diff_images(reference, *picture, std::nullopt, run.ctx));

@@ -99,18 +99,6 @@ struct Contender {
   }
 };
 
-/// `cast`, whether it returns the frame or overwrites it.
-template <class Grid>
-Status cast_into(const Grid& grid, const Camera& camera, const CastOptions& options, Frame& frame,
-                 Context& ctx) {
-  if constexpr (requires { cast(grid, camera, options, frame, ctx); }) {
-    return cast(grid, camera, options, frame, ctx);
-  } else {
-    VOX_TRY(frame, cast(grid, camera, options, ctx));
-    return {};
-  }
-}
-
 std::vector<Contender> contenders(const Compressed& lossless, const Compressed& lossy,
                                   const std::shared_ptr<const NanovdbGrid>& peer, const Options& o,
                                   Context& ctx) {
@@ -121,8 +109,9 @@ std::vector<Contender> contenders(const Compressed& lossless, const Compressed& 
       CastOptions options;
       options.width = o.width;
       options.height = o.height;
-      VOX_CHECK(cast_into(grid, camera, options, *frame, ctx));
-      for (size_t i = 0; i < frame->pixels.size(); ++i) voxels[i] = std::to_array(frame->pixels[i].voxel);
+      options.details = true;  // as the others do, it stores the voxel that was hit
+      VOX_CHECK(cast(grid, camera, options, *frame, ctx));
+      for (size_t i = 0; i < frame->details.size(); ++i) voxels[i] = std::to_array(frame->details[i].voxel);
       return frame->seconds;
     };
     all.push_back({std::move(name), compressed.bytes, cast_frame, {}, 0, 0});

@@ -205,8 +205,7 @@ TEST_F(CameraFile, HostileFilesAreRefused) {
                "{\"orbit\": [az, el, dist]}, ...]}");
   std::string many = R"({"eye":[0,0,2]})";
   for (int i = 0; i < 100000; ++i) many += R"(,{"eye":[0,0,2]})";
-  expect_wrong(frames(many),
-               "frames[100000]: too many frames: expected at most 100000");
+  expect_wrong(frames(many), "frames[100000]: too many frames: expected at most 100000");
   expect_wrong(read(std::string((16 << 20) + 1, ' ')),
                "a camera path of 16777217 bytes: expected at most 16777216");
   // Every cut of a good file.

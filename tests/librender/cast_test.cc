@@ -37,11 +37,20 @@ CastOptions small() {
   return options;
 }
 
+/// A picture with all that is known of its pixels.
+template <class Grid>
+Result<Frame> cast(const Grid& grid, const Camera& camera, CastOptions options, Context& ctx) {
+  Frame frame;
+  options.details = true;
+  VOX_CHECK(render::cast(grid, camera, options, frame, ctx));
+  return frame;
+}
+
 /// What was seen, without what it cost.
 void expect_same_pixels(const Frame& a, const Frame& b, double tolerance) {
   ASSERT_EQ(a.pixels.size(), b.pixels.size());
   for (size_t i = 0; i < a.pixels.size(); ++i) {
-    for (int k = 0; k < 3; ++k) ASSERT_EQ(a.pixels[i].voxel[k], b.pixels[i].voxel[k]) << "pixel " << i;
+    for (int k = 0; k < 3; ++k) ASSERT_EQ(a.details[i].voxel[k], b.details[i].voxel[k]) << "pixel " << i;
     ASSERT_EQ(a.pixels[i].distance, b.pixels[i].distance) << "pixel " << i;
     for (int k = 0; k < 4; ++k)
       ASSERT_NEAR(a.pixels[i].colour[k], b.pixels[i].colour[k], tolerance) << "pixel " << i;
@@ -96,7 +105,8 @@ TEST(Cast, BaselineSeesNearlyTheSame) {
   const auto baseline = cast(*grid, camera, options, ctx);
   int differing = 0;
   for (size_t i = 0; i < exact->pixels.size(); ++i)
-    differing += !std::equal(exact->pixels[i].voxel, exact->pixels[i].voxel + 3, baseline->pixels[i].voxel);
+    differing +=
+        !std::equal(exact->details[i].voxel, exact->details[i].voxel + 3, baseline->details[i].voxel);
   EXPECT_LE(differing, 3);  // it adds up floats: a ray near an edge may see another voxel
   EXPECT_FALSE(cast(SvmmGrid(compress("menger:3", 100, {})), camera, options, ctx));
 }

@@ -16,10 +16,11 @@ class LayersTest : public testing::Test {
     frame_.width = 12;
     frame_.height = 9;
     frame_.pixels.resize(12 * 9);
+    frame_.details.resize(12 * 9);
     auto normals = Image::create(12, 9, 3, SampleType::f32, ctx_);
     EXPECT_TRUE(normals);
     for (size_t i = 0; i < frame_.pixels.size(); ++i) {
-      frame_.pixels[i].cells = static_cast<uint32_t>(i + 1);
+      frame_.details[i].cells = static_cast<uint32_t>(i + 1);
       if (i % 3 != 0) frame_.pixels[i].distance = 1 + static_cast<float>(i) / 64;
       for (int k = 0; k < 3; ++k)
         normals->row(0)[3 * i + static_cast<size_t>(k)] = static_cast<float>(i) + static_cast<float>(k) / 4;

@@ -64,7 +64,7 @@ GridRay make(const ExactRay& ray) {
     d[a] = static_cast<double>(ray.direction[a]) * 0.25;
     dims[a] = ray.dims[a];
   }
-  return GridRay(o, d, dims);
+  return GridRay(RayOrigin(o, dims), d);
 }
 
 Voxel3 voxel_of(const GridRay& ray) {
@@ -104,17 +104,16 @@ TEST(GridRay, VisitsExactlyTheVoxelsOfTheReference) {
     const ExactRay exact = random_ray(random, trial % 10 ? 40 : 3000);
     const auto want = reference(exact, 4000);
     GridRay ray = make(exact);
-    double t = 0, last = 0;
-    bool inside = ray.enter(t);
+    double last = 0;
+    bool inside = ray.enter();
     ASSERT_EQ(inside, !want.empty()) << "trial " << trial;
     hits += inside;
     for (const Voxel3& v : want) {
       ASSERT_TRUE(inside) << "trial " << trial;
       ASSERT_EQ(voxel_of(ray), v) << "trial " << trial << " step " << steps;
-      ASSERT_GE(t, last * (1 - 1e-15));
-      last = t;
-      const int64_t lo[3] = {v[0], v[1], v[2]}, hi[3] = {v[0] + 1, v[1] + 1, v[2] + 1};
-      inside = ray.leave(lo, hi, t);
+      ASSERT_GE(ray.t(), last * (1 - 1e-15));
+      last = ray.t();
+      inside = ray.leave(0);
       ++steps;
     }
     if (want.size() < 4000) {
@@ -131,24 +130,27 @@ TEST(GridRay, StepsOverCellsLandWhereSingleStepsDo) {
     const ExactRay exact = random_ray(random, 200);
     const auto single = reference(exact, 100000);
     GridRay ray = make(exact);
-    double t = 0;
-    bool inside = ray.enter(t);
+    bool inside = ray.enter();
     size_t at = 0;
     while (inside) {
       ASSERT_LT(at, single.size());
       ASSERT_EQ(voxel_of(ray), single[at]) << "trial " << trial;
-      int64_t lo[3], hi[3];
-      for (size_t a = 0; a < 3; ++a) {  // an aligned cell around the voxel, cut to the grid
-        const int64_t edge = int64_t{1} << random() % 6;
-        lo[a] = single[at][a] / edge * edge;
-        hi[a] = std::min(lo[a] + edge, exact.dims[a]);
+      // An aligned cube around the voxel, or any box; both cut to the grid.
+      const bool cube = random() % 2 == 0;
+      const int log2_edge = static_cast<int>(random() % 6);
+      uint32_t lo[3], hi[3];
+      for (size_t a = 0; a < 3; ++a) {
+        const auto v = static_cast<uint32_t>(single[at][a]), dim = static_cast<uint32_t>(exact.dims[a]);
+        lo[a] = cube ? v >> log2_edge << log2_edge : v - static_cast<uint32_t>(random() % (v + 1));
+        hi[a] = cube ? std::min(lo[a] + (1u << log2_edge), dim)
+                     : v + 1 + static_cast<uint32_t>(random() % (dim - v));
       }
       const auto in_cell = [&](const Voxel3& v) {
         return v[0] >= lo[0] && v[1] >= lo[1] && v[2] >= lo[2] && v[0] < hi[0] && v[1] < hi[1] &&
                v[2] < hi[2];
       };
       while (at < single.size() && in_cell(single[at])) ++at;
-      inside = ray.leave(lo, hi, t);
+      inside = cube ? ray.leave(log2_edge) : ray.leave(lo, hi);
     }
     ASSERT_EQ(at, single.size()) << "trial " << trial;
   }
@@ -158,14 +160,12 @@ TEST(GridRay, ExtremeDirections) {
   const int64_t dims[3] = {1 << 20, 1 << 20, 1 << 20};
   for (const double tiny : {0.0, -0.0, 1e-310, -5e-324, 1e-80}) {
     const double o[3] = {-1000000.0, 3.5, 7.0}, d[3] = {1, tiny, tiny};
-    GridRay ray(o, d, dims);
-    double t = 0;
-    ASSERT_TRUE(ray.enter(t));
-    EXPECT_EQ(t, 1000000.0);
+    GridRay ray(RayOrigin(o, dims), d);
+    ASSERT_TRUE(ray.enter());
+    EXPECT_EQ(ray.t(), 1000000.0);
     EXPECT_EQ(voxel_of(ray)[1], 3);
-    const int64_t lo[3] = {0, 0, 0}, hi[3] = {1 << 20, 1 << 20, 1 << 20};
-    EXPECT_FALSE(ray.leave(lo, hi, t));
-    EXPECT_EQ(t, 1000000.0 + (1 << 20));
+    EXPECT_FALSE(ray.leave(20));
+    EXPECT_EQ(ray.t(), 1000000.0 + (1 << 20));
   }
 }
 

@@ -1,0 +1,12 @@
+// A camera before a volume, as the kernel wants it.
+#pragma once
+
+#include "librender/cast_kernel.h"
+#include "librender/ray_cast.h"
+
+namespace voxkit::render {
+
+/// Errors: ErrorCode::usage where the camera is 2^31 voxels away or more.
+Result<CastParams> cast_params(const VolumeInfo& info, const Camera& camera, const CastOptions& options);
+
+}  // namespace voxkit::render
