@@ -3,6 +3,7 @@
 
 #include <bit>
 #include <cmath>
+#include <type_traits>
 
 #include "librender/grid.h"
 #include "librender/opacity.h"
@@ -130,6 +131,22 @@ VOX_HD_HOT void follow_baseline(const CastParams& params, DenseView::Cursor& cur
   }
 }
 
+/// Chooses Algorithm 1.
+struct BaselineView {
+  DenseView dense;
+  VOX_HD_HOT DenseView::Cursor cursor() const { return dense.cursor(); }
+};
+
+/// The pixel (x, y) of any view.
+template <class View, class Cursor>
+VOX_HD_HOT void cast_ray(const CastParams& params, const View&, Cursor& cursor, int x, int y, Pixel& pixel,
+                         PixelDetail& detail) {
+  if constexpr (std::is_same_v<View, BaselineView>)
+    follow_baseline(params, cursor, x, y, pixel, detail);
+  else
+    follow(params, cursor, x, y, pixel, detail);
+}
+
 /// A block of threads is this many pixels wide and high.
 constexpr int block_width = 8, block_height = 8;
 /// Where a thread of a launch is.
@@ -153,7 +170,7 @@ VOX_HD void cast_pixel(const CastParams& params, const View& view, ThreadIndex a
   const bool looked_at = x >= params.left && x < params.right && y >= params.top && y < params.bottom;
   Pixel pixel;
   PixelDetail detail;
-  if (looked_at) follow(params, cursor, x, y, pixel, detail);
+  if (looked_at) cast_ray(params, view, cursor, x, y, pixel, detail);
   pixels[i] = pixel;
   details[i] = detail;
   costs[i] = {cursor.blocks(), cursor.bytes()};

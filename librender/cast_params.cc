@@ -70,4 +70,19 @@ Result<CastParams> cast_params(const VolumeInfo& info, const Camera& camera, con
   return params;
 }
 
+void add_up(const std::vector<PixelCost>& costs, Frame& frame) {
+  frame.rays = costs.size();
+  frame.rays_hit = frame.cells_visited = frame.blocks_touched = frame.bytes_touched = 0;
+  for (size_t i = 0; i < costs.size(); ++i) {
+    frame.rays_hit += frame.details[i].voxel[0] >= 0;
+    frame.cells_visited += frame.details[i].cells;
+    frame.blocks_touched += costs[i].blocks;
+    frame.bytes_touched += costs[i].bytes;
+  }
+}
+
+Status only_dense_has_baseline() {
+  return bad_usage("the baseline traversal steps through uncompressed volumes: expected path or restart");
+}
+
 }  // namespace voxkit::render

@@ -24,7 +24,7 @@ struct Rect {
 
 /// The pixels of a tile, one after the other: a cursor goes on where the last ray ended. `details` may be
 /// null.
-template <bool baseline, class View>
+template <class View>
 [[gnu::always_inline]] inline void cast_tile(const CastParams& params, const View& view, const Rect& tile,
                                              Pixel* pixels, PixelDetail* details, Counts& count) {
   auto cursor = view.cursor();
@@ -36,10 +36,7 @@ template <bool baseline, class View>
     // Of this row, only left .. right may see something.
     for (int x = std::max(params.left, tile.x0); x < std::min(params.right, tile.x1); ++x) {
       PixelDetail detail;
-      if constexpr (baseline)
-        follow_baseline(params, cursor, x, y, pixels[row + x], detail);
-      else
-        follow(params, cursor, x, y, pixels[row + x], detail);
+      cast_ray(params, view, cursor, x, y, pixels[row + x], detail);
       count.hit += detail.voxel[0] >= 0;
       count.cells += detail.cells;
       if (details != nullptr) details[row + x] = detail;
@@ -50,20 +47,25 @@ template <bool baseline, class View>
 }
 
 // The same code for two kinds of machine.
-template <bool baseline, class View>
+template <class View>
 void cast_tile_generic(const CastParams& params, const View& view, const Rect& tile, Pixel* pixels,
                        PixelDetail* details, Counts& count) {
-  cast_tile<baseline>(params, view, tile, pixels, details, count);
+  cast_tile(params, view, tile, pixels, details, count);
 }
-template <bool baseline, class View>
+template <class View>
 [[gnu::target("avx2,bmi,bmi2,lzcnt,popcnt,fma")]] void cast_tile_avx2(const CastParams& params,
                                                                       const View& view, const Rect& tile,
                                                                       Pixel* pixels, PixelDetail* details,
                                                                       Counts& count) {
-  cast_tile<baseline>(params, view, tile, pixels, details, count);
+  cast_tile(params, view, tile, pixels, details, count);
 }
 
-template <bool baseline, class View>
+bool has_avx2() {
+  return __builtin_cpu_supports("avx2") && __builtin_cpu_supports("bmi") && __builtin_cpu_supports("bmi2") &&
+         __builtin_cpu_supports("popcnt") && __builtin_cpu_supports("fma") && __builtin_cpu_supports("lzcnt");
+}
+
+template <class View>
 Status cast_with(const View& view, const VolumeInfo& info, const Camera& camera, const CastOptions& options,
                  Frame& frame, Context& ctx) {
   VOX_TRY(const CastParams params, cast_params(info, camera, options));
@@ -74,9 +76,7 @@ Status cast_with(const View& view, const VolumeInfo& info, const Camera& camera,
   const int64_t across = (options.width + tile_edge - 1) / tile_edge,
                 down = (options.height + tile_edge - 1) / tile_edge;
   std::vector<Counts> counts(static_cast<size_t>(across * down));
-  const auto run = __builtin_cpu_supports("avx2") && __builtin_cpu_supports("bmi2")
-                       ? cast_tile_avx2<baseline, View>
-                       : cast_tile_generic<baseline, View>;
+  const auto run = options.native && has_avx2() ? cast_tile_avx2<View> : cast_tile_generic<View>;
   const auto start = std::chrono::steady_clock::now();
   VOX_CHECK(parallel_for(ctx, across * down, [&](int64_t i) -> Status {
     const int x = static_cast<int>(i % across) * tile_edge, y = static_cast<int>(i / across) * tile_edge;
@@ -114,24 +114,23 @@ SvmmGrid::SvmmGrid(std::shared_ptr<const svmm::Volume> volume)
 Status cast(const DenseGrid& grid, const Camera& camera, const CastOptions& options, Frame& frame,
             Context& ctx) {
   return options.traversal == Traversal::baseline
-             ? cast_with<true>(grid.view(), grid.info(), camera, options, frame, ctx)
-             : cast_with<false>(grid.view(), grid.info(), camera, options, frame, ctx);
+             ? cast_with(BaselineView{grid.view()}, grid.info(), camera, options, frame, ctx)
+             : cast_with(grid.view(), grid.info(), camera, options, frame, ctx);
 }
 
 Status cast(const SvmmGrid& grid, const Camera& camera, const CastOptions& options, Frame& frame,
             Context& ctx) {
-  if (options.traversal == Traversal::baseline)
-    return bad_usage("the baseline traversal steps through uncompressed volumes: expected path or restart");
+  if (options.traversal == Traversal::baseline) return only_dense_has_baseline();
   using svmm::MappedPools;
   const MappedPools pools(grid.volume());
   const svmm::View* view = &grid.volume().store().view;
   const VolumeInfo& info = grid.info();
   if (options.traversal == Traversal::restart) {
     const SvmmView<MappedPools, Search::restart> restart{view, &pools};
-    VOX_CHECK(cast_with<false>(restart, info, camera, options, frame, ctx));
+    VOX_CHECK(cast_with(restart, info, camera, options, frame, ctx));
   } else if (options.level_of_detail || !options.skip) {
     const SvmmView<MappedPools, Search::path> path{view, &pools};
-    VOX_CHECK(cast_with<false>(path, info, camera, options, frame, ctx));
+    VOX_CHECK(cast_with(path, info, camera, options, frame, ctx));
   } else {
     const int64_t dims[3] = {info.dims.x, info.dims.y, info.dims.z};
     const ColourOf colour_of(info.format, options.range);
@@ -142,7 +141,7 @@ Status cast(const SvmmGrid& grid, const Camera& camera, const CastOptions& optio
                               &options.range,
                               &grid.void_memos(),
                               least_log2(info, camera, options)};
-    VOX_CHECK(cast_with<false>(boxed, info, camera, options, frame, ctx));
+    VOX_CHECK(cast_with(boxed, info, camera, options, frame, ctx));
   }
   return grid.volume().store().status();
 }

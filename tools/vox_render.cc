@@ -16,6 +16,7 @@
 #include "libmetrics/image_diff.h"
 #include "libmetrics/ssim.h"
 #include "librender/camera_file.h"
+#include "librender/device_grid.h"
 #include "librender/layers.h"
 #include "librender/shade.h"
 #include "tools/common/input.h"
@@ -118,7 +119,8 @@ void declare(CommandLine& line, Options& o) {
   line.option("--lod", "on|off", "Stop at voxels as small as a pixel (off)", one_of(o.lod, {"on", "off"}));
   line.option("--skip", "on|off", "Step over whole cells of one value; off: voxel by voxel (on)",
               one_of(o.skip, {"on", "off"}));
-  line.option("--device", "DEVICE", "Where to render: cpu (cpu)", one_of(o.device, {"cpu", "cuda"}));
+  line.option("--device", "DEVICE", "Where to render: cpu or cuda, a GPU (cpu)",
+              one_of(o.device, {"cpu", "cuda"}));
   declare_range_option(line, o.range,
                        "Sample values that are shown as 0 and 1 (default: full scale, or measured)");
   line.text("--reference", "INPUT2", "Render this as well, and report how far the pictures are apart",
@@ -133,10 +135,12 @@ struct Scene {
   VolumeInfo info;
   std::optional<SvmmGrid> compressed;
   std::shared_ptr<const DenseGrid> dense;
+  std::unique_ptr<const DeviceGrid> device;  ///< one of them on the GPU
   ValueRange range{0, 255};
 
   Status draw(const Camera& camera, CastOptions options, Frame& frame, Context& ctx) const {
     options.range = range;
+    if (device) return device->cast(camera, options, frame);
     return compressed ? cast(*compressed, camera, options, frame, ctx)
                       : cast(*dense, camera, options, frame, ctx);
   }
@@ -162,6 +166,11 @@ Result<Scene> open_scene(const std::string& name, const Options& o, Run& run) {
   } else {
     run.stage("read");
     VOX_TRY(scene.dense, DenseGrid::read(*input.source, run.ctx));
+  }
+  if (o.device == "cuda") {
+    run.stage("upload");
+    VOX_TRY(scene.device, scene.compressed ? DeviceGrid::upload(*scene.compressed, run.ctx)
+                                           : DeviceGrid::upload(*scene.dense, run.ctx));
   }
   return scene;
 }
@@ -243,8 +252,7 @@ Result<std::string> frame_name(const std::string& pattern, size_t frame) {
 }
 
 Result<int> work(const Options& o, Run& run) {
-  if (o.device == "cuda")
-    return fail(ErrorCode::device, {}, "--device cuda: this build has no CUDA: expected cpu");
+  if (o.device == "cuda") VOX_CHECK(check_device());
   if (o.output.empty() && !o.no_images) return bad_usage("no output: expected -o OUT.png, or --no-images");
   const bool exr = !o.no_images && has_ending(o.output, ".exr");
   if (!o.layers.empty() && !exr)
@@ -351,7 +359,7 @@ Result<int> work(const Options& o, Run& run) {
 
   const double average = costs.average(), speed = costs.mrays_per_s();
   Json json = Json::result();
-  json.set("tool", run.tool).set("version", version_text()).set("input", o.input).set("device", "cpu");
+  json.set("tool", run.tool).set("version", version_text()).set("input", o.input).set("device", o.device);
   json.set("size", fmt::format("{}x{}", o.width, o.height)).set("mode", o.mode).set("traversal", o.traversal);
   costs.write(json);
   if (other) {

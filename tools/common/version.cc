@@ -23,7 +23,8 @@ constexpr const char* simd_target = "scalar";
 }  // namespace
 
 std::string version_text() {
-  return fmt::format("{} ({}, {}, {}, cuda no)", build_version, build_commit, build_compiler, simd_target);
+  return fmt::format("{} ({}, {}, {}, cuda {})", build_version, build_commit, build_compiler, simd_target,
+                     build_cuda ? "yes" : "no");
 }
 
 }  // namespace voxkit::cli
