@@ -31,16 +31,22 @@ constexpr float opaque = 0.995f;
 /// The direction through a pixel's centre in grid coordinates; t = 1 is where it is 1 away along the axis.
 struct PixelRay {
   double direction[3];
-  double length;  ///< of the direction in the world
 };
 VOX_HD_HOT PixelRay ray_through(const CastParams& params, int x, int y) {
   PixelRay ray;
   const double u = x + 0.5, v = y + 0.5;
   for (int a = 0; a < 3; ++a)
     ray.direction[a] = params.corner[a] + (params.across[a] * u + params.down[a] * v);
-  const double right = (u - params.width * 0.5) * params.pixel, up = (v - params.height * 0.5) * params.pixel;
-  ray.length = std::sqrt(1 + (right * right + up * up));
   return ray;
+}
+/// The length of that in the world.
+VOX_HD_HOT double world_length(const CastParams& params, int x, int y) {
+  const double right = (x + 0.5 - params.width * 0.5) * params.pixel,
+               up = (y + 0.5 - params.height * 0.5) * params.pixel;
+  return std::sqrt(1 + (right * right + up * up));
+}
+VOX_HD_HOT Approach approach(const CastParams& params, int x, int y) {
+  return Approach(params.start, ray_through(params, x, y).direction);
 }
 
 /// Front-to-back blending of `length` base voxels of one colour; true when the ray has become opaque.
@@ -54,13 +60,13 @@ VOX_HD_HOT bool blend(const Colour& colour, double length, Pixel& pixel) {
 
 /// Follows one ray over the cells of a grid. The pixel is as it was made.
 template <class Cursor>
-VOX_HD_HOT void follow(const CastParams& params, Cursor& cursor, int x, int y, Pixel& pixel,
-                       PixelDetail& detail) {
-  const PixelRay through = ray_through(params, x, y);
-  GridRay ray(params.start, through.direction);
+VOX_HD_HOT void follow(const CastParams& params, const Approach& approach, Cursor& cursor, int x, int y,
+                       Pixel& pixel, PixelDetail& detail) {
+  GridRay ray(params.start, approach);
   if (!ray.enter()) return;
+  const double length = world_length(params, x, y);
   cursor.start();
-  const double cone = params.cone * through.length;
+  const double cone = params.cone * length;
   for (bool inside = true; inside;) {
     // Voxels as wide as the cone, or less, are fine enough: floor(log2(width)).
     const double width = cone * ray.t();
@@ -74,12 +80,12 @@ VOX_HD_HOT void follow(const CastParams& params, Cursor& cursor, int x, int y, P
     }
     const double entered = ray.t();
     if (detail.voxel[0] < 0) {
-      pixel.distance = static_cast<float>(entered * through.length);
+      pixel.distance = static_cast<float>(entered * length);
       for (int a = 0; a < 3; ++a) detail.voxel[a] = static_cast<int32_t>(voxel[a]);
     }
     const Colour colour = params.colour_of(cell.value);
     if (colour.alpha < 1) inside = params.skip ? cell.leave(ray) : ray.leave(0);  // opaque: not left
-    if (blend(colour, (ray.t() - entered) * through.length / params.edge, pixel)) break;
+    if (blend(colour, (ray.t() - entered) * length / params.edge, pixel)) break;
   }
 }
 
@@ -87,6 +93,7 @@ VOX_HD_HOT void follow(const CastParams& params, Cursor& cursor, int x, int y, P
 VOX_HD_HOT void follow_baseline(const CastParams& params, DenseView::Cursor& cursor, int x, int y,
                                 Pixel& pixel, PixelDetail& detail) {
   const PixelRay through = ray_through(params, x, y);
+  const double length = world_length(params, x, y);
   const int64_t(&dims)[3] = params.dims;
   float o[3], d[3], delta[3], t_max[3], t_enter = 0, t_leave = __builtin_inff();
   for (int a = 0; a < 3; ++a) {
@@ -119,11 +126,11 @@ VOX_HD_HOT void follow_baseline(const CastParams& params, DenseView::Cursor& cur
     t = t_max[axis];
     if (!params.colour_of.is_void(cell.value)) {
       if (detail.voxel[0] < 0) {
-        pixel.distance = static_cast<float>(static_cast<double>(entered) * through.length);
+        pixel.distance = static_cast<float>(static_cast<double>(entered) * length);
         for (int a = 0; a < 3; ++a) detail.voxel[a] = static_cast<int32_t>(voxel[a]);
       }
-      const double length = static_cast<double>(t - entered) * through.length / params.edge;
-      if (blend(params.colour_of(cell.value), length, pixel)) break;
+      const double crossed = static_cast<double>(t - entered) * length / params.edge;
+      if (blend(params.colour_of(cell.value), crossed, pixel)) break;
     }
     t_max[axis] += delta[axis];
     voxel[axis] += step[axis];
@@ -144,7 +151,7 @@ VOX_HD_HOT void cast_ray(const CastParams& params, const View&, Cursor& cursor, 
   if constexpr (std::is_same_v<View, BaselineView>)
     follow_baseline(params, cursor, x, y, pixel, detail);
   else
-    follow(params, cursor, x, y, pixel, detail);
+    follow(params, approach(params, x, y), cursor, x, y, pixel, detail);
 }
 
 /// A block of threads is this many pixels wide and high.

@@ -51,16 +51,8 @@ class ColourOf {
   }
   /// Whether a voxel is void, which costs less than its colour.
   VOX_HD_HOT bool is_void(const Voxel& v) const {
-    switch (format_) {
-      case VoxelFormat::rgba32:
-        return v.as<uint32_t>() >> 24 == 0;
-      case VoxelFormat::rgb24:
-        return v.as<uint32_t>() == 0;
-      case VoxelFormat::float32:
-        return !(scale_ > 0 && static_cast<double>(v.as<float>()) > lo_);
-      default:
-        return !(scale_ > 0 && static_cast<double>(v.as<uint32_t>()) > lo_);
-    }
+    if (format_ == VoxelFormat::float32) return !(scale_ > 0 && static_cast<double>(v.as<float>()) > lo_);
+    return v.as<uint32_t>() >> void_shift_ <= void_most_;
   }
 
  private:
@@ -71,6 +63,8 @@ class ColourOf {
   }
   VoxelFormat format_;
   double lo_, scale_;
+  int void_shift_;         ///< to what tells, of the bits of a voxel
+  int64_t void_most_ = 0;  ///< greatest that is void
 };
 
 }  // namespace voxkit::render

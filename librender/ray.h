@@ -46,44 +46,66 @@ struct RayOrigin {
   int64_t mask;  ///< side - 1
 };
 
+/// A ray before it enters the grid, as far as that is arithmetic without decisions: for many rays side by
+/// side. The greatest component of the direction is between 2^-100 and 2^100; those below 2^-200 are taken
+/// for zero.
+struct Approach {
+  double direction[3];
+  double inverse[3];  ///< of the absolute direction; infinite: never crosses
+  double first, end;  ///< when the last near plane and the first far plane are crossed; -1: has none to cross
+
+  VOX_HD_HOT Approach(const RayOrigin& from, const double (&towards)[3]) {
+    double t[3], far[3];
+    for (int a = 0; a < 3; ++a) {
+      const bool mirrored = towards[a] < 0;
+      const double size = std::fabs(towards[a]);
+      direction[a] = towards[a];
+      inverse[a] = 1 / (size < 0x1p-200 ? 0 : size);
+      const double to_near = mirrored ? from.to_near[1][a] : from.to_near[0][a],
+                   to_far = mirrored ? from.to_far[1][a] : from.to_far[0][a];
+      t[a] = to_near > 0 ? to_near * inverse[a] : -1;
+      far[a] = to_far > 0 ? to_far * inverse[a] : -1;
+    }
+    const double near_two = t[0] > t[1] ? t[0] : t[1], far_two = far[0] < far[1] ? far[0] : far[1];
+    first = t[2] > near_two ? t[2] : near_two;
+    end = far[2] < far_two ? far[2] : far_two;
+  }
+  VOX_HD_HOT Approach() = default;
+  /// Above what quotients up to the end of the grid are off by.
+  VOX_HD_HOT double margin() const { return end * 0x1p-48; }
+};
+
 /// A ray on its way through a grid. One that lies in a plane between voxels belongs to the voxels on the
 /// upper side, as it goes; planes that are crossed at once are crossed in the order x, y, z.
 class GridRay {
  public:
-  /// The greatest component of the direction is between 2^-100 and 2^100; those below 2^-200 are taken for
-  /// zero.
-  VOX_HD_HOT GridRay(const RayOrigin& from, const double (&direction)[3]) : clear_(from.clear) {
+  VOX_HD_HOT GridRay(const RayOrigin& from, const Approach& approach)
+      : t_(approach.first), margin_(approach.margin()), t_end_(approach.end), clear_(from.clear) {
     for (int a = 0; a < 3; ++a) {
-      const int mirrored = direction[a] < 0 ? 1 : 0;
-      const double size = std::fabs(direction[a]);
+      const int mirrored = approach.direction[a] < 0 ? 1 : 0;
+      const double size = std::fabs(approach.direction[a]);
       direction_[a] = size < 0x1p-200 ? 0 : size;
-      inverse_[a] = 1 / direction_[a];  // infinite: never crosses
+      inverse_[a] = approach.inverse[a];
       origin_[a] = from.at[mirrored][a];
       near_[a] = from.near[mirrored][a];
-      to_near_[a] = from.to_near[mirrored][a];
-      to_far_[a] = from.to_far[mirrored][a];
       far_[a] = from.far[mirrored][a];
+      to_near_[a] = from.to_near[mirrored][a];
       flip_[a] = mirrored != 0 ? from.mask : 0;
     }
   }
 
   /// Moves to the voxel in which the ray enters the grid, at t() >= 0; false if it misses.
   VOX_HD_HOT bool enter() {
-    double t[3], end[3];
-    int beyond = 0;
+    const double first = t_, close = first - margin_;
+    if (t_end_ < 0 || first > t_end_ + margin_) return false;
+    t_ = first > 0 ? first : 0;  // it may start inside
+    int candidates = 0;
+    double t[3];
     for (int a = 0; a < 3; ++a) {
       t[a] = to_near_[a] > 0 ? to_near_[a] * inverse_[a] : -1;
-      end[a] = to_far_[a] * inverse_[a];
-      beyond |= to_far_[a] <= 0;
+      candidates += t[a] >= close;
     }
-    const double first = greatest(t), t_end = least(end);
-    // Above what quotients up to the end of the grid are off by.
-    margin_ = t_end * 0x1p-48;
-    if (beyond != 0 || first > t_end + margin_) return false;
-    t_ = first > 0 ? first : 0;  // it may start inside
-    const double close = first - margin_;
-    const int candidates = (t[0] >= close) + (t[1] >= close) + (t[2] >= close);
-    int unclear = (first > t_end - margin_) | ((first > 0) & (candidates > 1));
+    int unclear = (first > t_end_ - margin_) | ((first > 0) & (candidates > 1));
     for (int a = 0; a < 3; ++a) {
       const bool crossed = (t[a] > 0) & (t[a] == first);
       const int64_t low = t[a] >= 0 ? near_[a] : static_cast<int64_t>(origin_[a]);
@@ -126,10 +148,6 @@ class GridRay {
   VOX_HD_HOT static double least(const double (&t)[3]) {
     const double two = t[0] < t[1] ? t[0] : t[1];
     return t[2] < two ? t[2] : two;
-  }
-  VOX_HD_HOT static double greatest(const double (&t)[3]) {
-    const double two = t[0] > t[1] ? t[0] : t[1];
-    return t[2] > two ? t[2] : two;
   }
   VOX_HD_HOT double time(int a, int64_t plane) const {
     return (static_cast<double>(plane) - origin_[a]) * inverse_[a];
@@ -186,8 +204,8 @@ class GridRay {
     return ray;
   }
 
-  double origin_[3], direction_[3], inverse_[3], to_near_[3], to_far_[3];
-  double t_ = 0, margin_ = 0, clear_;
+  double origin_[3], direction_[3], inverse_[3], to_near_[3];
+  double t_, margin_, t_end_, clear_;
   int64_t voxel_[3] = {}, near_[3], far_[3], flip_[3];
 };
 

@@ -34,9 +34,16 @@ template <class View>
     if (details != nullptr) std::fill(details + row + tile.x0, details + row + tile.x1, PixelDetail{});
     if (y < params.top || y >= params.bottom) continue;
     // Of this row, only left .. right may see something.
-    for (int x = std::max(params.left, tile.x0); x < std::min(params.right, tile.x1); ++x) {
+    const int left = std::max(params.left, tile.x0), right = std::min(params.right, tile.x1);
+    Approach approaches[tile_edge];
+    if constexpr (!std::is_same_v<View, BaselineView>)
+      for (int x = left; x < right; ++x) approaches[x - left] = approach(params, x, y);
+    for (int x = left; x < right; ++x) {
       PixelDetail detail;
-      cast_ray(params, view, cursor, x, y, pixels[row + x], detail);
+      if constexpr (std::is_same_v<View, BaselineView>)
+        follow_baseline(params, cursor, x, y, pixels[row + x], detail);
+      else
+        follow(params, approaches[x - left], cursor, x, y, pixels[row + x], detail);
       count.hit += detail.voxel[0] >= 0;
       count.cells += detail.cells;
       if (details != nullptr) details[row + x] = detail;

@@ -7,8 +7,9 @@
 
 namespace voxkit::svmm {
 
-/// Whether `is(value)` holds for every voxel lo <= v < hi, a box inside the volume. Looks at `budget` voxels
-/// at most, which it counts down; false where these do not suffice or a block is missing.
+/// Whether `is(value)` holds for every voxel lo <= v < hi, a box inside the volume. What it holds for must be
+/// such that it holds for a mean of voxels if it holds for each: being void, say. Looks at `budget` voxels at
+/// most, which it counts down; false where these do not suffice or a block is missing.
 template <class Pools, class Is>
 class EveryVoxel {
  public:
@@ -48,10 +49,15 @@ class EveryVoxel {
           }
           const uint32_t at[3] = {x, y, z};
           uint32_t from[3], to[3];
+          bool all_of_it = true;
           for (int a = 0; a < 3; ++a) {
-            from[a] = std::max(lo[a], at[a] << level.shift);
-            to[a] = static_cast<uint32_t>(std::min<uint64_t>(hi[a], (uint64_t{at[a]} + 1) << level.shift));
+            const uint64_t begin = uint64_t{at[a]} << level.shift, end = (uint64_t{at[a]} + 1) << level.shift;
+            from[a] = static_cast<uint32_t>(std::max<uint64_t>(lo[a], begin));
+            to[a] = static_cast<uint32_t>(std::min<uint64_t>(hi[a], end));
+            all_of_it &= to[a] - from[a] == end - begin;
           }
+          // What the mean is not, not all of its voxels are.
+          if (all_of_it && !is_(decoded_value(value, view_.format))) return false;
           if (!inside(k - 1, pools_.block(k - 1, link.child(i)), from, to, value)) return false;
         }
     return true;

@@ -35,8 +35,8 @@ struct Options {
   std::string input, output, path, report, reference;
   OpenOptions open;
   int width = 1024, height = 768;
-  std::string camera = "orbit:30,20,1.8", mode = "surface", traversal = "path", shade = "phong", lod = "off",
-              skip = "on", device = "cpu";
+  std::string camera = "orbit:30,20,1.8", mode = "surface", traversal = "path", reference_traversal,
+              shade = "phong", lod = "off", skip = "on", device = "cpu";
   bool depth_antialias = false;
   int rays_a_side = 1;  ///< of a pixel
   std::vector<Layer> layers;
@@ -103,8 +103,7 @@ void declare(CommandLine& line, Options& o) {
               one_of(o.mode, {"surface"}));
   line.option("--traversal", "KIND",
               "path: keeps the path of blocks; restart: from the root at every step; baseline: voxel by "
-              "voxel in floats, dense volumes "
-              "only (path)",
+              "voxel in floats, uncompressed volumes only (path)",
               one_of(o.traversal, {"path", "restart", "baseline"}));
   line.option("--shade", "KIND", "none, phong, ssao or phong+ssao (phong)",
               one_of(o.shade, {"none", "phong", "ssao", "phong+ssao"}));
@@ -125,6 +124,8 @@ void declare(CommandLine& line, Options& o) {
                        "Sample values that are shown as 0 and 1 (default: full scale, or measured)");
   line.text("--reference", "INPUT2", "Render this as well, and report how far the pictures are apart",
             o.reference);
+  line.option("--reference-traversal", "KIND", "That of the reference (as --traversal)",
+              one_of(o.reference_traversal, {"path", "restart", "baseline"}));
   line.text("--report", "OUT.json", "Write what every frame cost", o.report);
   line.flag("--no-images", "Render and report only", o.no_images);
   declare_input_options(line, o.open);
@@ -211,6 +212,10 @@ class Held {
   uint64_t bytes_;
 };
 
+Traversal traversal_of(const std::string& name) {
+  return name == "restart" ? Traversal::restart : name == "baseline" ? Traversal::baseline : Traversal::path;
+}
+
 /// What the frames of one volume cost.
 struct Costs {
   Json frames = Json::array();
@@ -232,6 +237,7 @@ struct Costs {
         .set("samples", uint64_t{0});
     json.set("cells_visited", frame.cells_visited).set("blocks_touched", frame.blocks_touched);
     json.set("bytes_touched", frame.bytes_touched);
+    json.set("bytes_touched", frame.bytes_touched);
     frames.push(std::move(json));
   }
   void write(Json& json) {
@@ -252,6 +258,8 @@ Result<std::string> frame_name(const std::string& pattern, size_t frame) {
 }
 
 Result<int> work(const Options& o, Run& run) {
+  if (!o.reference_traversal.empty() && o.reference.empty())
+    return bad_usage("--reference-traversal: there is no reference: expected --reference INPUT2");
   if (o.device == "cuda") VOX_CHECK(check_device());
   if (o.output.empty() && !o.no_images) return bad_usage("no output: expected -o OUT.png, or --no-images");
   const bool exr = !o.no_images && has_ending(o.output, ".exr");
@@ -288,9 +296,7 @@ Result<int> work(const Options& o, Run& run) {
   CastOptions cast_options;
   cast_options.width = o.width * o.rays_a_side;
   cast_options.height = o.height * o.rays_a_side;
-  cast_options.traversal = o.traversal == "restart"    ? Traversal::restart
-                           : o.traversal == "baseline" ? Traversal::baseline
-                                                       : Traversal::path;
+  cast_options.traversal = traversal_of(o.traversal);
   cast_options.level_of_detail = o.lod == "on";
   cast_options.skip = o.skip == "on";
   cast_options.details = o.wants(Layer::steps);
@@ -339,10 +345,9 @@ Result<int> work(const Options& o, Run& run) {
       if (!exr && !names.empty()) VOX_CHECK(write_image(names[i], *picture, run.options.force));
     }
     if (other) {
-      CastOptions dense_options = cast_options;
-      if (other->compressed && dense_options.traversal == Traversal::baseline)
-        dense_options.traversal = Traversal::path;
-      VOX_CHECK(other->draw(cameras[i], dense_options, expected, run.ctx));
+      CastOptions reference_options = cast_options;
+      if (!o.reference_traversal.empty()) reference_options.traversal = traversal_of(o.reference_traversal);
+      VOX_CHECK(other->draw(cameras[i], reference_options, expected, run.ctx));
       VOX_TRY(const Picture floats, shaded(expected, cameras[i], false));
       VOX_TRY(const Image reference, image_of(floats.rgba, run.ctx));
       VOX_TRY(const ImageDiff diff, diff_images(reference, *picture, std::nullopt, run.ctx));

@@ -64,7 +64,8 @@ GridRay make(const ExactRay& ray) {
     d[a] = static_cast<double>(ray.direction[a]) * 0.25;
     dims[a] = ray.dims[a];
   }
-  return GridRay(RayOrigin(o, dims), d);
+  const RayOrigin origin(o, dims);
+  return GridRay(origin, Approach(origin, d));
 }
 
 Voxel3 voxel_of(const GridRay& ray) {
@@ -160,7 +161,8 @@ TEST(GridRay, ExtremeDirections) {
   const int64_t dims[3] = {1 << 20, 1 << 20, 1 << 20};
   for (const double tiny : {0.0, -0.0, 1e-310, -5e-324, 1e-80}) {
     const double o[3] = {-1000000.0, 3.5, 7.0}, d[3] = {1, tiny, tiny};
-    GridRay ray(RayOrigin(o, dims), d);
+    const RayOrigin origin(o, dims);
+    GridRay ray(origin, Approach(origin, d));
     ASSERT_TRUE(ray.enter());
     EXPECT_EQ(ray.t(), 1000000.0);
     EXPECT_EQ(voxel_of(ray)[1], 3);
