@@ -35,7 +35,7 @@ class VoidMemo {
   }
 
  private:
-  static constexpr int log2_size = 17;
+  static constexpr int log2_size = 16;
   static constexpr size_t size = size_t{1} << log2_size;
   std::vector<Slot> slots_;
 };
