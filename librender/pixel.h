@@ -32,7 +32,13 @@ class ColourOf {
         lo_(format == VoxelFormat::bitmap ? 0 : range.lo),
         scale_(format == VoxelFormat::bitmap ? 1
                : range.hi > range.lo         ? 1 / (range.hi - range.lo)
-                                             : 0) {}
+                                             : 0),
+        void_shift_(format == VoxelFormat::rgba32 ? 24 : 0),
+        void_most_(0) {
+    // Of integers those up to lo are void: all or none where that is beyond them.
+    if (!is_colour(format))
+      void_most_ = scale_ <= 0 || lo_ >= 65535 ? 65535 : lo_ < 0 ? -1 : static_cast<int64_t>(lo_);
+  }
 
   VOX_HD_HOT Colour operator()(const Voxel& v) const {
     const auto byte = [bits = v.as<uint32_t>()](int k) {
@@ -63,8 +69,8 @@ class ColourOf {
   }
   VoxelFormat format_;
   double lo_, scale_;
-  int void_shift_;         ///< to what tells, of the bits of a voxel
-  int64_t void_most_ = 0;  ///< greatest that is void
+  int void_shift_;     ///< to what tells, of the bits of a voxel
+  int64_t void_most_;  ///< greatest that is void
 };
 
 }  // namespace voxkit::render
