@@ -26,7 +26,8 @@ struct TestRay {
   int64_t dims[3];
   int64_t origin[3];  ///< in units
   double direction[3];
-  int64_t target[3];  ///< planes around which something is close; all 0: none
+  bool has_target;
+  int64_t target[3];  ///< planes, one an axis, around which something is close
 };
 
 /// The same, mirrored in the middle of the grid where the direction is negative, in integers. All products

@@ -4,6 +4,7 @@
 #include <array>
 #include <bit>
 #include <cmath>
+#include <optional>
 
 #include "tests/stress/algorithm1.h"
 #include "tests/stress/counted_ray.h"
@@ -48,11 +49,9 @@ struct Start {
     for (int a = 0; a < 3; ++a) {
       origin[a] = static_cast<double>(ray.origin[a]) * 0x1p-20;
       direction[a] = ray.direction[a];
-      has_target |= ray.target[a] != 0;
     }
   }
   double origin[3], direction[3];
-  bool has_target = false;
 };
 
 double relative_error(double t, long double exact) {
@@ -164,7 +163,7 @@ class Algorithm1Ray {
       not_on_path();
     }
   }
-  /// The exact path has ended.
+  /// The exact path has ended; it may go on, up to `most` voxels.
   void finish(int64_t most) {
     while (inside_ && most-- > 0) not_on_path();
   }
@@ -247,22 +246,20 @@ void note(double margins, bool exact, Switch& at) {
 }
 
 /// A box around a voxel (mirrored): any, or, if there is a target, at times up to that.
-void make_box(const TestRay& ray, const Frame& f, const Place& at, bool has_target, Random& random,
-              Planes& lo, Planes& hi) {
+void make_box(const TestRay& ray, const Frame& f, const Place& at, Random& random, Planes& lo, Planes& hi) {
   for (int a = 0; a < 3; ++a) {
     const int64_t target = f.mirrored[a] ? f.dims[a] - ray.target[a] : ray.target[a];
-    const bool aim = has_target && target > at.v[a] && random.chance(2);
+    const bool aim = ray.has_target && target > at.v[a] && random.chance(2);
     hi[a] = aim ? target : at.v[a] + 1 + random.spread(0, f.dims[a] - at.v[a] - 1);
     lo[a] = random.number(0, at.v[a]);
   }
 }
 /// An aligned cube around a voxel: its edge, and where it ends (mirrored).
-int make_cell(const TestRay& ray, const Frame& f, const Place& at, bool has_target, Random& random,
-              Planes& hi) {
+int make_cell(const TestRay& ray, const Frame& f, const Place& at, Random& random, Planes& hi) {
   const auto largest = static_cast<uint64_t>(std::max({f.dims[0], f.dims[1], f.dims[2]}));
   int log2_edge = static_cast<int>(random.number(0, 64 - std::countl_zero(largest - 1)));
   const int64_t target = ray.target[random.number(0, 2)];
-  if (has_target && target > 0 && random.chance(2))
+  if (ray.has_target && target > 0 && random.chance(2))
     log2_edge = static_cast<int>(random.number(0, std::countr_zero(static_cast<uint64_t>(target))));
   for (int a = 0; a < 3; ++a) {
     const int64_t lo = f.unmirrored(a, at.v[a]) >> log2_edge << log2_edge,
@@ -285,9 +282,9 @@ void follow_single(const TestRay& ray, const Start& start, const Frame& f, int64
   counts.hits += exact_inside;
   OurRay ours(ray, start, f, "single steps", counts.single, counts);
   bool inside = ours.enter(exact_inside, at);
-  // On long ways to a target, what is before it is skipped.
-  const bool skip = start.has_target && most > 1000 && inside;
-  if (skip) {
+  // In large grids, what is before a target is skipped, and Algorithm 1 left out.
+  const bool skip = ray.has_target && std::max({f.dims[0], f.dims[1], f.dims[2]}) > 1000;
+  if (skip && inside) {
     Planes lo, hi;
     for (int a = 0; a < 3; ++a) {
       const int64_t target = f.mirrored[a] ? f.dims[a] - ray.target[a] : ray.target[a];
@@ -300,30 +297,24 @@ void follow_single(const TestRay& ray, const Start& start, const Frame& f, int64
     inside = ours.leave(low, high, exact_inside, at);
     most = 64;
   }
-  if (!exact_inside) {
-    if (!skip) Algorithm1Ray(ray, start, f, counts.algorithm1).finish(most);
-    return;
-  }
-  Stepper stepper(f, at);
-  if (start.has_target) {
+  std::optional<Algorithm1Ray> published;
+  if (!skip) published.emplace(ray, start, f, counts.algorithm1);
+  if (exact_inside) {
     const Doubles doubles(ray, start);
-    while (inside && most-- > 0) {
+    Stepper stepper(f, at);
+    if (published) published->exact(at);
+    while (most-- > 0) {
       const Planes next = {stepper.at().v[0] + 1, stepper.at().v[1] + 1, stepper.at().v[2] + 1};
-      const bool more = stepper.step();
-      inside = ours.leave(0, more, stepper.at());
-      note(doubles.apart(next), ours.was_exact(), counts.times);
+      exact_inside = stepper.step();
+      if (inside) {
+        inside = ours.leave(0, exact_inside, stepper.at());
+        if (ray.has_target) note(doubles.apart(next), ours.was_exact(), counts.times);
+      }
+      if (!exact_inside) break;
+      if (published) published->exact(stepper.at());
     }
-    return;
   }
-  Algorithm1Ray published(ray, start, f, counts.algorithm1);
-  published.exact(at);
-  while (most-- > 0) {
-    exact_inside = stepper.step();
-    inside = inside && ours.leave(0, exact_inside, stepper.at());
-    if (!exact_inside) break;
-    published.exact(stepper.at());
-  }
-  if (!exact_inside) published.finish(f.dims[0] + f.dims[1] + f.dims[2]);
+  if (published && !exact_inside) published->finish(most);
 }
 
 /// Steps over cells or boxes.
@@ -339,17 +330,17 @@ void follow_cells(const TestRay& ray, const Start& start, const Frame& f, bool c
     Planes lo, hi;
     int log2_edge = 1;
     if (cubes) {
-      log2_edge = make_cell(ray, f, at, start.has_target, random, hi);
+      log2_edge = make_cell(ray, f, at, random, hi);
       exact_inside = Jump::cross(f, hi, at);
       inside = ours.leave(log2_edge, exact_inside, at);
     } else {
-      make_box(ray, f, at, start.has_target, random, lo, hi);
+      make_box(ray, f, at, random, lo, hi);
       uint32_t low[3], high[3];
       unmirror(f, lo, hi, low, high);
       exact_inside = Jump::cross(f, hi, at);
       inside = ours.leave(low, high, exact_inside, at);
     }
-    if (start.has_target && log2_edge > 0 && doubles.apart(hi) > 2)
+    if (ray.has_target && log2_edge > 0 && doubles.apart(hi) > 2)
       note(doubles.off_planes(hi), ours.was_exact(), counts.positions);
   }
 }
@@ -393,7 +384,7 @@ int64_t check_reference(const TestRay& ray, int64_t most, Random& random, Counts
     const bool left = jumped.v[0] >= hi[0] || jumped.v[1] >= hi[1] || jumped.v[2] >= hi[2];
     if (left) {
       if (!same(jumped)) fail("the references disagree on a jump");
-      make_box(ray, f, plain.at(), start.has_target, random, lo, hi);
+      make_box(ray, f, plain.at(), random, lo, hi);
     }
     plain.step();
     inside = plain.at().inside(f);

@@ -80,7 +80,7 @@ void tie(Random& random, Closeness closeness, Tie& t) {
     if (a == t.first || std::fabs(t.direction[a] - static_cast<double>(far(a) / when)) > 0) continue;
     const double apart =
         closeness == Closeness::times ? t.time_margin() : t.position_margin() / t.direction[a];
-    const long double gap = static_cast<long double>(random.sign() * margins(random) * apart) * unit;
+    const long double gap = static_cast<long double>(random.either(margins(random) * apart)) * unit;
     t.direction[a] = static_cast<double>(far(a) / (when + gap));
   }
 }
@@ -134,6 +134,7 @@ double rounding(const Tie& t, Closeness closeness) {
 }
 
 void put(const Tie& t, TestRay& ray) {
+  ray.has_target = true;
   for (int a = 0; a < 3; ++a) {
     ray.origin[a] = t.mirrored[a] ? t.dims[a] * unit - t.origin[a] : t.origin[a];
     ray.direction[a] = t.mirrored[a] ? -t.direction[a] : t.direction[a];
@@ -157,7 +158,8 @@ void worst_tie(Random& random, Closeness closeness, TestRay& ray) {
       t.direction[a] +=
           static_cast<double>(random.number(-64, 64)) * std::scalbn(1.0, std::ilogb(t.direction[a]) - 52);
     } else {
-      const int64_t moved = t.origin[a] + random.sign() * random.spread(1, unit);
+      const int64_t moved =
+          t.origin[a] + static_cast<int64_t>(random.either(static_cast<double>(random.spread(1, unit))));
       if (moved < t.plane[a] * unit && moved >= -1000000 * unit) t.origin[a] = moved;
       // The other one follows, so that the planes stay close to each other.
       const int b = a == t.first ? t.other : t.first;

@@ -127,7 +127,7 @@ TestRay make_ray(Family family, const Dims& dims, Random& random) {
       back_from_corner(random, ray, direction);
       const int along = one_axis();
       ray.origin[along] = around(random, dims[static_cast<size_t>(along)]);
-      ray.direction[along] = static_cast<double>(random.sign()) * random.mantissa() * 7;
+      ray.direction[along] = random.either(random.mantissa() * 7);
       break;
     }
     case Family::one_axis:
@@ -145,7 +145,7 @@ TestRay make_ray(Family family, const Dims& dims, Random& random) {
       double greatest = 0;  // 0x1p-200 is where components become zero, whatever the others are
       for (const double d : ray.direction) greatest = std::fmax(greatest, std::fabs(d));
       for (double& d : ray.direction)
-        d = d == 0 ? random.sign() * sizes[random.number(0, 8)] : d / std::exp2(std::ilogb(greatest));
+        d = d == 0 ? random.either(sizes[random.number(0, 8)]) : d / std::exp2(std::ilogb(greatest));
       break;
     }
     case Family::faces: {
@@ -186,8 +186,8 @@ TestRay make_ray(Family family, const Dims& dims, Random& random) {
     case Family::any_direction:
       for (size_t a = 0; a < 3; ++a) {
         if (random.chance(2)) ray.origin[a] = point(random, dims[a]);
-        ray.direction[a] =
-            random.sign() * std::scalbn(random.mantissa(), -static_cast<int>(random.spread(0, 31)));
+        const int exponent = -static_cast<int>(random.spread(0, 31));
+        ray.direction[a] = random.either(std::scalbn(random.mantissa(), exponent));
       }
       break;
     case Family::near_ties:

@@ -23,6 +23,8 @@ class Random {
   /// One in [1, 2) with all its bits.
   double mantissa() { return 1 + static_cast<double>(bits_() >> 12) * 0x1p-52; }
   int sign() { return chance(2) ? 1 : -1; }
+  /// x or -x
+  double either(double x) { return chance(2) ? x : -x; }
   /// lo .. hi, every power of two as likely as any other; lo >= 0.
   int64_t spread(int64_t lo, int64_t hi) {
     const int64_t most = (hi - lo) >> number(0, 63 - __builtin_clzll(static_cast<uint64_t>(hi - lo) | 1));

@@ -195,7 +195,7 @@ int run(const Options& options) {
         sum.times.exactly, sum.times.in_doubles, sum.positions.exactly, sum.positions.in_doubles,
         sum.worst.time, sum.worst.position, n(sum.checked), n(sum.steps()), seconds, sum.first_error.c_str());
   } else {
-    print_markdown(by_family, "rays");
+    print_markdown(by_family, "family");
     print_markdown(by_grid, "grid");
     std::printf(
         "Near ties: times at most %.4f margins apart were compared exactly, at least %.4f in doubles;\n"
