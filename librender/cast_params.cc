@@ -65,7 +65,10 @@ Result<CastParams> cast_params(const VolumeInfo& info, const Camera& camera, con
       .skip = options.skip,
       .colour_of = ColourOf(info.format, options.range),
   };
-  if (options.level_of_detail) params.cone = params.pixel / params.edge;
+  // Where not even the farthest corner is two voxels to a pixel, every ray sees all detail.
+  const double farthest = glm::length(rays.eye()) + glm::length(transform.half);
+  const double cone = params.pixel / params.edge;
+  if (options.level_of_detail && cone * farthest >= 2) params.cone = cone;
   bound_pixels(rays, transform.half, params);
   return params;
 }

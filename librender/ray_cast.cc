@@ -73,9 +73,8 @@ bool has_avx2() {
 }
 
 template <class View>
-Status cast_with(const View& view, const VolumeInfo& info, const Camera& camera, const CastOptions& options,
-                 Frame& frame, Context& ctx) {
-  VOX_TRY(const CastParams params, cast_params(info, camera, options));
+Status cast_with(const View& view, const CastParams& params, const CastOptions& options, Frame& frame,
+                 Context& ctx) {
   frame.width = options.width;
   frame.height = options.height;
   frame.pixels.resize(static_cast<size_t>(options.width) * static_cast<size_t>(options.height));
@@ -120,9 +119,10 @@ SvmmGrid::SvmmGrid(std::shared_ptr<const svmm::Volume> volume)
 
 Status cast(const DenseGrid& grid, const Camera& camera, const CastOptions& options, Frame& frame,
             Context& ctx) {
+  VOX_TRY(const CastParams params, cast_params(grid.info(), camera, options));
   return options.traversal == Traversal::baseline
-             ? cast_with(BaselineView{grid.view()}, grid.info(), camera, options, frame, ctx)
-             : cast_with(grid.view(), grid.info(), camera, options, frame, ctx);
+             ? cast_with(BaselineView{grid.view()}, params, options, frame, ctx)
+             : cast_with(grid.view(), params, options, frame, ctx);
 }
 
 Status cast(const SvmmGrid& grid, const Camera& camera, const CastOptions& options, Frame& frame,
@@ -132,23 +132,17 @@ Status cast(const SvmmGrid& grid, const Camera& camera, const CastOptions& optio
   const MappedPools pools(grid.volume());
   const svmm::View* view = &grid.volume().store().view;
   const VolumeInfo& info = grid.info();
+  VOX_TRY(const CastParams params, cast_params(info, camera, options));
   if (options.traversal == Traversal::restart) {
     const SvmmView<MappedPools, Search::restart> restart{view, &pools};
-    VOX_CHECK(cast_with(restart, info, camera, options, frame, ctx));
-  } else if (options.level_of_detail || !options.skip) {
+    VOX_CHECK(cast_with(restart, params, options, frame, ctx));
+  } else if (params.cone > 0 || !options.skip) {
     const SvmmView<MappedPools, Search::path> path{view, &pools};
-    VOX_CHECK(cast_with(path, info, camera, options, frame, ctx));
+    VOX_CHECK(cast_with(path, params, options, frame, ctx));
   } else {
-    const int64_t dims[3] = {info.dims.x, info.dims.y, info.dims.z};
-    const ColourOf colour_of(info.format, options.range);
-    const BoxedSvmmView boxed{view,
-                              &pools,
-                              &colour_of,
-                              &dims,
-                              &options.range,
-                              &grid.void_memos(),
-                              least_log2(info, camera, options)};
-    VOX_CHECK(cast_with(boxed, info, camera, options, frame, ctx));
+    const BoxedSvmmView boxed{
+        view, &pools, &params, &options.range, &grid.void_memos(), least_log2(info, camera, options)};
+    VOX_CHECK(cast_with(boxed, params, options, frame, ctx));
   }
   return grid.volume().store().status();
 }

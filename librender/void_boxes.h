@@ -6,8 +6,7 @@
 #include <mutex>
 #include <vector>
 
-#include "librender/grid.h"
-#include "librender/pixel.h"
+#include "librender/cast_kernel.h"
 #include "libsvmm/every_voxel.h"
 
 namespace voxkit::render {
@@ -102,8 +101,7 @@ struct BoxedCell {
 struct BoxedSvmmView {
   const svmm::View* view;
   const svmm::MappedPools* pools;
-  const ColourOf* colour_of;
-  const int64_t (*dims)[3];
+  const CastParams* params;
   const ValueRange* range;
   VoidMemos* memos;
   int least_log2;  ///< cells smaller than that are not worth growing
@@ -124,7 +122,7 @@ struct BoxedSvmmView {
       }
       if (last_.holds(v)) return {last_.value, last_.log2_edge, nullptr};
       const auto cell = walk_.locate(x, y, z, -1);
-      if (!volume_.colour_of->is_void(cell.value)) {
+      if (!volume_.params->colour_of.is_void(cell.value)) {
         for (int a = 0; a < 3; ++a) {
           last_.box.lo[a] = v[a] >> cell.log2_edge << cell.log2_edge;
           last_.size[a] = uint32_t{1} << cell.log2_edge;
@@ -157,12 +155,12 @@ struct BoxedSvmmView {
         for (int a = 0; a < 3; ++a) {
           box.lo[a] = slot.cell[a] = corner[a];
           box.hi[a] = static_cast<uint32_t>(
-              std::min(int64_t{corner[a]} + (int64_t{1} << log2_edge), (*volume_.dims)[a]));
+              std::min(int64_t{corner[a]} + (int64_t{1} << log2_edge), volume_.params->dims[a]));
         }
         slot.log2_edge = log2_edge;
-        const auto is_void = [this](const Voxel& value) { return volume_.colour_of->is_void(value); };
+        const auto is_void = [this](const Voxel& value) { return volume_.params->colour_of.is_void(value); };
         svmm::EveryVoxel every(*volume_.view, *volume_.pools, is_void, 4096);
-        slot.box = grow(box, *volume_.dims, every);
+        slot.box = grow(box, volume_.params->dims, every);
       }
       return slot.box;
     }
