@@ -100,7 +100,7 @@ class DenseGrid {
   std::unique_ptr<Buffer> buffer_;
 };
 
-class VoidMemos;
+class VoidMemo;
 
 /// A compressed volume, drawn from its file.
 class SvmmGrid {
@@ -108,12 +108,13 @@ class SvmmGrid {
   explicit SvmmGrid(std::shared_ptr<const svmm::Volume> volume);
   const VolumeInfo& info() const { return volume_->info(); }
   const svmm::Volume& volume() const { return *volume_; }
-  /// What was learned from earlier pictures.
-  VoidMemos& void_memos() const { return *void_memos_; }
+  /// What was learned of the volume's void from earlier pictures that showed the same range of values.
+  std::shared_ptr<VoidMemo> void_memo(const ValueRange& range) const;
 
  private:
   std::shared_ptr<const svmm::Volume> volume_;
-  std::shared_ptr<VoidMemos> void_memos_;
+  struct Learned;
+  std::shared_ptr<Learned> learned_;
 };
 
 }  // namespace voxkit::render

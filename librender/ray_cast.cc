@@ -5,6 +5,7 @@
 #include <chrono>
 #include <cmath>
 #include <glm/geometric.hpp>
+#include <mutex>
 
 #include "formats/parallel.h"
 #include "librender/cast_params.h"
@@ -13,7 +14,7 @@
 namespace voxkit::render {
 namespace {
 
-constexpr int tile_edge = 32;  // pixels along the edge of a task
+constexpr int tile_width = 128, tile_height = 32;  // pixels of a task
 
 struct Counts {
   uint64_t hit = 0, cells = 0, blocks = 0, bytes = 0;
@@ -35,7 +36,7 @@ template <class View>
     if (y < params.top || y >= params.bottom) continue;
     // Of this row, only left .. right may see something.
     const int left = std::max(params.left, tile.x0), right = std::min(params.right, tile.x1);
-    Approach approaches[tile_edge];
+    Approach approaches[tile_width];
     if constexpr (!std::is_same_v<View, BaselineView>)
       for (int x = left; x < right; ++x) approaches[x - left] = approach(params, x, y);
     for (int x = left; x < right; ++x) {
@@ -67,9 +68,9 @@ template <class View>
   cast_tile(params, view, tile, pixels, details, count);
 }
 
-bool has_avx2() {
+bool has_avx2() {  // and with it lzcnt, which clang 14 cannot ask for
   return __builtin_cpu_supports("avx2") && __builtin_cpu_supports("bmi") && __builtin_cpu_supports("bmi2") &&
-         __builtin_cpu_supports("popcnt") && __builtin_cpu_supports("fma") && __builtin_cpu_supports("lzcnt");
+         __builtin_cpu_supports("popcnt") && __builtin_cpu_supports("fma");
 }
 
 template <class View>
@@ -79,14 +80,14 @@ Status cast_with(const View& view, const CastParams& params, const CastOptions& 
   frame.height = options.height;
   frame.pixels.resize(static_cast<size_t>(options.width) * static_cast<size_t>(options.height));
   frame.details.resize(options.details ? frame.pixels.size() : 0);
-  const int64_t across = (options.width + tile_edge - 1) / tile_edge,
-                down = (options.height + tile_edge - 1) / tile_edge;
+  const int64_t across = (options.width + tile_width - 1) / tile_width,
+                down = (options.height + tile_height - 1) / tile_height;
   std::vector<Counts> counts(static_cast<size_t>(across * down));
   const auto run = options.native && has_avx2() ? cast_tile_avx2<View> : cast_tile_generic<View>;
   const auto start = std::chrono::steady_clock::now();
   VOX_CHECK(parallel_for(ctx, across * down, [&](int64_t i) -> Status {
-    const int x = static_cast<int>(i % across) * tile_edge, y = static_cast<int>(i / across) * tile_edge;
-    const Rect tile{x, y, std::min(x + tile_edge, options.width), std::min(y + tile_edge, options.height)};
+    const int x = static_cast<int>(i % across) * tile_width, y = static_cast<int>(i / across) * tile_height;
+    const Rect tile{x, y, std::min(x + tile_width, options.width), std::min(y + tile_height, options.height)};
     run(params, view, tile, frame.pixels.data(), frame.details.empty() ? nullptr : frame.details.data(),
         counts[static_cast<size_t>(i)]);
     return {};
@@ -114,8 +115,20 @@ int least_log2(const VolumeInfo& info, const Camera& camera, const CastOptions& 
 
 }  // namespace
 
+struct SvmmGrid::Learned {
+  std::mutex mutex;
+  std::shared_ptr<VoidMemo> void_memo;
+};
+
 SvmmGrid::SvmmGrid(std::shared_ptr<const svmm::Volume> volume)
-    : volume_(std::move(volume)), void_memos_(std::make_shared<VoidMemos>()) {}
+    : volume_(std::move(volume)), learned_(std::make_shared<Learned>()) {}
+
+std::shared_ptr<VoidMemo> SvmmGrid::void_memo(const ValueRange& range) const {
+  const std::lock_guard lock(learned_->mutex);
+  std::shared_ptr<VoidMemo>& memo = learned_->void_memo;
+  if (!memo || !(memo->range() == range)) memo = std::make_shared<VoidMemo>(range);
+  return memo;
+}
 
 Status cast(const DenseGrid& grid, const Camera& camera, const CastOptions& options, Frame& frame,
             Context& ctx) {
@@ -140,8 +153,8 @@ Status cast(const SvmmGrid& grid, const Camera& camera, const CastOptions& optio
     const SvmmView<MappedPools, Search::path> path{view, &pools};
     VOX_CHECK(cast_with(path, params, options, frame, ctx));
   } else {
-    const BoxedSvmmView boxed{
-        view, &pools, &params, &options.range, &grid.void_memos(), least_log2(info, camera, options)};
+    const auto memo = grid.void_memo(options.range);
+    const BoxedSvmmView boxed{view, &pools, &params, memo.get(), least_log2(info, camera, options)};
     VOX_CHECK(cast_with(boxed, params, options, frame, ctx));
   }
   return grid.volume().store().status();

@@ -2,9 +2,8 @@
 // holes. For the host; a device searches anew for every ray.
 #pragma once
 
+#include <atomic>
 #include <memory>
-#include <mutex>
-#include <vector>
 
 #include "librender/cast_kernel.h"
 #include "libsvmm/every_voxel.h"
@@ -16,51 +15,63 @@ struct VoidBox {
   uint32_t lo[3], hi[3];
 };
 
-/// Void boxes by the cell that they were grown from. The box of a cell depends on nothing else, so what is
-/// remembered from other rays and other pictures changes no result.
+/// Void boxes by the cell that they were grown from, for all threads that draw a volume. The box of a cell
+/// depends on nothing else, so what is remembered from other rays and other pictures changes no result.
 class VoidMemo {
  public:
-  VoidMemo() : slots_(size) {}
-  struct Slot {
-    uint32_t cell[3] = {};
-    int log2_edge = -1;
-    VoidBox box{};
+  /// What is void depends on `range`.
+  explicit VoidMemo(const ValueRange& range) : range_(range), slots_(std::make_unique<Slot[]>(size)) {}
+  const ValueRange& range() const { return range_; }
+
+  /// A cell: its lo corner and log2 of its edge.
+  struct Key {
+    uint32_t corner[3];
+    int log2_edge;
   };
-  /// The slot of a cell: holds its box, or that of another.
-  Slot& slot(const uint32_t (&cell)[3], int log2_edge) {
-    const uint64_t key = cell[0] * uint64_t{0x9e3779b97f4a7c15} ^ cell[1] * uint64_t{0xc2b2ae3d27d4eb4f} ^
-                         cell[2] * uint64_t{0x165667b19e3779f9} ^ static_cast<uint64_t>(log2_edge) << 59;
-    return slots_[(key * uint64_t{0x9e3779b97f4a7c15}) >> (64 - log2_size)];
+  /// Whether the box of a cell is known. Reads only, so that threads do not take the slot from each other's
+  /// caches: a slot that is written meanwhile has another version afterwards.
+  bool find(const Key& key, VoidBox& box) const {
+    const Slot& slot = slots_[hash(key)];
+    const uint32_t version = slot.version.load(std::memory_order_acquire);
+    bool found = version % 2 == 0 &&
+                 slot.log2_edge.load(std::memory_order_acquire) == static_cast<uint32_t>(key.log2_edge + 1);
+    for (int a = 0; a < 3; ++a) {
+      found &= slot.corner[a].load(std::memory_order_acquire) == key.corner[a];
+      box.lo[a] = slot.lo[a].load(std::memory_order_acquire);
+      box.hi[a] = slot.hi[a].load(std::memory_order_acquire);
+    }
+    return found && slot.version.load(std::memory_order_relaxed) == version;
+  }
+  /// Takes the place of another. Does nothing where someone else is at it.
+  void insert(const Key& key, const VoidBox& box) {
+    Slot& slot = slots_[hash(key)];
+    uint32_t version = slot.version.load(std::memory_order_relaxed);
+    if (version % 2 != 0 || !slot.version.compare_exchange_strong(version, version + 1)) return;
+    slot.log2_edge.store(static_cast<uint32_t>(key.log2_edge + 1), std::memory_order_release);
+    for (int a = 0; a < 3; ++a) {
+      slot.corner[a].store(key.corner[a], std::memory_order_release);
+      slot.lo[a].store(box.lo[a], std::memory_order_release);
+      slot.hi[a].store(box.hi[a], std::memory_order_release);
+    }
+    slot.version.store(version + 2, std::memory_order_release);
   }
 
  private:
-  static constexpr int log2_size = 16;
+  struct Slot {
+    std::atomic<uint32_t> version{0};    ///< odd while it is written
+    std::atomic<uint32_t> log2_edge{0};  ///< and 1; 0: empty
+    std::atomic<uint32_t> corner[3]{}, lo[3]{}, hi[3]{};
+  };
+  static constexpr int log2_size = 17;
   static constexpr size_t size = size_t{1} << log2_size;
-  std::vector<Slot> slots_;
-};
-
-/// The memos of a volume, one for each thread that draws it.
-class VoidMemos {
- public:
-  /// One that nobody else has. What is void depends on `range`.
-  std::unique_ptr<VoidMemo> take(const ValueRange& range) {
-    const std::lock_guard lock(mutex_);
-    if (!(range == range_)) free_.clear();
-    range_ = range;
-    if (free_.empty()) return std::make_unique<VoidMemo>();
-    auto memo = std::move(free_.back());
-    free_.pop_back();
-    return memo;
+  static size_t hash(const Key& key) {
+    const uint64_t mixed =
+        key.corner[0] * uint64_t{0x9e3779b97f4a7c15} ^ key.corner[1] * uint64_t{0xc2b2ae3d27d4eb4f} ^
+        key.corner[2] * uint64_t{0x165667b19e3779f9} ^ static_cast<uint64_t>(key.log2_edge) << 59;
+    return (mixed * uint64_t{0x9e3779b97f4a7c15}) >> (64 - log2_size);
   }
-  void give_back(std::unique_ptr<VoidMemo> memo) {
-    const std::lock_guard lock(mutex_);
-    free_.push_back(std::move(memo));
-  }
-
- private:
-  std::mutex mutex_;
   ValueRange range_;
-  std::vector<std::unique_ptr<VoidMemo>> free_;
+  std::unique_ptr<Slot[]> slots_;
 };
 
 /// Grows an aligned void cell as far as it remains void, first by as much as it is wide, then by less.
@@ -102,17 +113,12 @@ struct BoxedSvmmView {
   const svmm::View* view;
   const svmm::MappedPools* pools;
   const CastParams* params;
-  const ValueRange* range;
-  VoidMemos* memos;
+  VoidMemo* memo;
   int least_log2;  ///< cells smaller than that are not worth growing
 
   class Cursor {
    public:
-    explicit Cursor(const BoxedSvmmView& volume)
-        : volume_(volume), memo_(volume.memos->take(*volume.range)), walk_(*volume.view, *volume.pools) {}
-    ~Cursor() { volume_.memos->give_back(std::move(memo_)); }
-    Cursor(const Cursor&) = delete;
-    Cursor& operator=(const Cursor&) = delete;
+    explicit Cursor(const BoxedSvmmView& volume) : volume_(volume), walk_(*volume.view, *volume.pools) {}
     [[gnu::always_inline]] BoxedCell locate(uint32_t x, uint32_t y, uint32_t z, int) {
       // Most likely the void box that the ray before came to next, or the voxel in which it ended.
       const uint32_t v[3] = {x, y, z};
@@ -145,24 +151,21 @@ struct BoxedSvmmView {
 
    private:
     /// The void box of the void cell around a voxel.
-    [[gnu::noinline]] const VoidBox& grown(const uint32_t (&v)[3], int log2_edge) {
-      const uint32_t corner[3] = {v[0] >> log2_edge << log2_edge, v[1] >> log2_edge << log2_edge,
-                                  v[2] >> log2_edge << log2_edge};
-      VoidMemo::Slot& slot = memo_->slot(corner, log2_edge);
-      if (slot.log2_edge != log2_edge || slot.cell[0] != corner[0] || slot.cell[1] != corner[1] ||
-          slot.cell[2] != corner[2]) {
-        VoidBox box;
-        for (int a = 0; a < 3; ++a) {
-          box.lo[a] = slot.cell[a] = corner[a];
-          box.hi[a] = static_cast<uint32_t>(
-              std::min(int64_t{corner[a]} + (int64_t{1} << log2_edge), volume_.params->dims[a]));
-        }
-        slot.log2_edge = log2_edge;
-        const auto is_void = [this](const Voxel& value) { return volume_.params->colour_of.is_void(value); };
-        svmm::EveryVoxel every(*volume_.view, *volume_.pools, is_void, 4096);
-        slot.box = grow(box, volume_.params->dims, every);
+    [[gnu::noinline]] VoidBox grown(const uint32_t (&v)[3], int log2_edge) {
+      VoidMemo::Key key{{}, log2_edge};
+      VoidBox box;
+      for (int a = 0; a < 3; ++a) key.corner[a] = v[a] >> log2_edge << log2_edge;
+      if (volume_.memo->find(key, box)) return box;
+      for (int a = 0; a < 3; ++a) {
+        box.lo[a] = key.corner[a];
+        box.hi[a] = static_cast<uint32_t>(
+            std::min(int64_t{box.lo[a]} + (int64_t{1} << log2_edge), volume_.params->dims[a]));
       }
-      return slot.box;
+      const auto is_void = [this](const Voxel& value) { return volume_.params->colour_of.is_void(value); };
+      svmm::EveryVoxel every(*volume_.view, *volume_.pools, is_void, 4096);
+      box = grow(box, volume_.params->dims, every);
+      volume_.memo->insert(key, box);
+      return box;
     }
 
     static constexpr unsigned remembered = 32;
@@ -177,7 +180,6 @@ struct BoxedSvmmView {
       }
     };
     const BoxedSvmmView& volume_;
-    std::unique_ptr<VoidMemo> memo_;
     svmm::Walk<svmm::MappedPools> walk_;
     Passed trail_[remembered];  ///< what the last rays came to, in the order of the way
     Passed last_;               ///< the last voxel that was not void

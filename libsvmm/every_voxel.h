@@ -35,8 +35,7 @@ class EveryVoxel {
           if (--budget_ < 0) return false;
           const Index3 v(x & level.within, y & level.within, z & level.within);
           if (k == 0) {
-            if (!is_(decode_base_voxel(block, level.size, v, view_.format, view_.base, view_.layout, parent)))
-              return false;
+            if (!is_(base_voxel(block, v, parent))) return false;
             continue;
           }
           const int64_t index = voxel_index(v, level.size);
@@ -61,6 +60,13 @@ class EveryVoxel {
           if (!inside(k - 1, pools_.block(k - 1, link.child(i)), from, to, value)) return false;
         }
     return true;
+  }
+
+  Voxel base_voxel(const std::byte* block, Index3 v, const Voxel& parent) const {
+    const LevelView& level = view_.levels[0];
+    if (view_.base == Base::raw && view_.layout == Layout::plain && view_.format == VoxelFormat::rgba32)
+      return Voxel::of(load_le<uint32_t>(block + voxel_index(v, level.size) * 4));
+    return decode_base_voxel(block, level.size, v, view_.format, view_.base, view_.layout, parent);
   }
 
   const View& view_;
