@@ -40,11 +40,13 @@ template <class View>
     if constexpr (!std::is_same_v<View, BaselineView>)
       for (int x = left; x < right; ++x) approaches[x - left] = approach(params, x, y);
     for (int x = left; x < right; ++x) {
+      Pixel pixel;
       PixelDetail detail;
       if constexpr (std::is_same_v<View, BaselineView>)
-        follow_baseline(params, cursor, x, y, pixels[row + x], detail);
+        follow_baseline(params, cursor, x, y, pixel, detail);
       else
-        follow(params, approaches[x - left], cursor, x, y, pixels[row + x], detail);
+        follow(params, approaches[x - left], cursor, x, y, pixel, detail);
+      pixels[row + x] = pixel;
       count.hit += detail.voxel[0] >= 0;
       count.cells += detail.cells;
       if (details != nullptr) details[row + x] = detail;
