@@ -45,9 +45,6 @@ VOX_HD_HOT double world_length(const CastParams& params, int x, int y) {
                up = (y + 0.5 - params.height * 0.5) * params.pixel;
   return std::sqrt(1 + (right * right + up * up));
 }
-VOX_HD_HOT Approach approach(const CastParams& params, int x, int y) {
-  return Approach(params.start, ray_through(params, x, y).direction);
-}
 
 /// Front-to-back blending of `length` base voxels of one colour; true when the ray has become opaque.
 VOX_HD_HOT bool blend(const Colour& colour, double length, Pixel& pixel) {
@@ -58,14 +55,17 @@ VOX_HD_HOT bool blend(const Colour& colour, double length, Pixel& pixel) {
   return pixel.colour[3] >= opaque;
 }
 
-/// Follows one ray over the cells of a grid. The pixel is as it was made.
+/// Keeps where the first voxel that is not void was entered.
+VOX_HD_HOT void found(const uint32_t (&voxel)[3], double distance, Pixel& pixel, PixelDetail& detail) {
+  pixel.distance = static_cast<float>(distance);
+  for (int a = 0; a < 3; ++a) detail.voxel[a] = static_cast<int32_t>(voxel[a]);
+}
+
+/// Follows a ray over the cells of a grid, from the voxel that it is in. Nothing was found so far.
 template <class Cursor>
-VOX_HD_HOT void follow(const CastParams& params, const Approach& approach, Cursor& cursor, int x, int y,
-                       Pixel& pixel, PixelDetail& detail) {
-  GridRay ray(params.start, approach);
-  if (!ray.enter()) return;
+VOX_HD_HOT void follow(const CastParams& params, GridRay& ray, Cursor& cursor, int x, int y, Pixel& pixel,
+                       PixelDetail& detail) {
   const double length = world_length(params, x, y);
-  cursor.start();
   const double cone = params.cone * length;
   for (bool inside = true; inside;) {
     // Voxels as wide as the cone, or less, are fine enough: floor(log2(width)).
@@ -79,10 +79,7 @@ VOX_HD_HOT void follow(const CastParams& params, const Approach& approach, Curso
       continue;
     }
     const double entered = ray.t();
-    if (detail.voxel[0] < 0) {
-      pixel.distance = static_cast<float>(entered * length);
-      for (int a = 0; a < 3; ++a) detail.voxel[a] = static_cast<int32_t>(voxel[a]);
-    }
+    if (detail.voxel[0] < 0) found(voxel, entered * length, pixel, detail);
     const Colour colour = params.colour_of(cell.value);
     if (colour.alpha < 1) inside = params.skip ? cell.leave(ray) : ray.leave(0);  // opaque: not left
     if (blend(colour, (ray.t() - entered) * length / params.edge, pixel)) break;
@@ -141,17 +138,21 @@ VOX_HD_HOT void follow_baseline(const CastParams& params, DenseView::Cursor& cur
 /// Chooses Algorithm 1.
 struct BaselineView {
   DenseView dense;
-  VOX_HD_HOT DenseView::Cursor cursor() const { return dense.cursor(); }
+  struct Cursor : DenseView::Cursor {};
+  VOX_HD_HOT Cursor cursor() const { return {dense.cursor()}; }
 };
 
 /// The pixel (x, y) of any view.
-template <class View, class Cursor>
-VOX_HD_HOT void cast_ray(const CastParams& params, const View&, Cursor& cursor, int x, int y, Pixel& pixel,
+template <class Cursor>
+VOX_HD_HOT void cast_ray(const CastParams& params, Cursor& cursor, int x, int y, Pixel& pixel,
                          PixelDetail& detail) {
-  if constexpr (std::is_same_v<View, BaselineView>)
+  if constexpr (std::is_same_v<Cursor, BaselineView::Cursor>) {
     follow_baseline(params, cursor, x, y, pixel, detail);
-  else
-    follow(params, approach(params, x, y), cursor, x, y, pixel, detail);
+  } else {
+    GridRay ray(params.start, ray_through(params, x, y).direction);
+    if (!ray.enter()) return;
+    follow(params, ray, cursor, x, y, pixel, detail);
+  }
 }
 
 /// A block of threads is this many pixels wide and high.
@@ -177,7 +178,7 @@ VOX_HD void cast_pixel(const CastParams& params, const View& view, ThreadIndex a
   const bool looked_at = x >= params.left && x < params.right && y >= params.top && y < params.bottom;
   Pixel pixel;
   PixelDetail detail;
-  if (looked_at) cast_ray(params, view, cursor, x, y, pixel, detail);
+  if (looked_at) cast_ray(params, cursor, x, y, pixel, detail);
   pixels[i] = pixel;
   details[i] = detail;
   costs[i] = {cursor.blocks(), cursor.bytes()};

@@ -51,7 +51,6 @@ struct DenseView {
       bytes_ += static_cast<uint32_t>(view.bytes);
       return {view.at(x, y, z), 0};
     }
-    VOX_HD_HOT static void start() {}
     VOX_HD_HOT static uint32_t blocks() { return 0; }
     VOX_HD_HOT uint32_t bytes() const { return bytes_; }
     uint32_t bytes_ = 0;
@@ -75,7 +74,6 @@ struct SvmmView {
       const auto found = walk_.locate(x, y, z, finest);
       return {found.value, found.log2_edge};
     }
-    VOX_HD_HOT static void start() {}
     /// Blocks entered, and bytes of links and values looked at, so far.
     VOX_HD_HOT uint32_t blocks() const { return walk_.blocks_entered(); }
     VOX_HD_HOT uint32_t bytes() const { return walk_.bytes_read(); }

@@ -23,51 +23,105 @@ struct Rect {
   int x0, y0, x1, y1;
 };
 
-/// The pixels of a tile, one after the other: a cursor goes on where the last ray ended. `details` may be
-/// null.
-template <class View>
+/// A block of pixels, of which (x, y) is the first, each given to `keep`.
+template <int width, int height, class Keep>
+[[gnu::always_inline]] inline void cast_packet(const CastParams& params, BoxedSvmmView::Cursor& cursor,
+                                               VoidTrail& trail, int x, int y, const Keep& keep) {
+  RayPacket<width, height> rays(params, x, y);
+  trail.follow(rays);
+  for (int i = 0; i < width * height; ++i) {
+    const int pixel_x = x + i % width, pixel_y = y + i / width;
+    Pixel pixel;
+    PixelDetail detail;
+    if (!rays.entered(i)) {
+      cast_ray(params, cursor, pixel_x, pixel_y, pixel, detail);
+      keep(pixel_x, pixel_y, pixel, detail);
+      continue;
+    }
+    const BoxedCell* cell = nullptr;
+    while (rays.moving(i)) {
+      cell = &cursor.locate(rays.voxel(i, 0), rays.voxel(i, 1), rays.voxel(i, 2), -1);
+      if (!cell->is_void) break;
+      trail.add(cell->box);
+      rays.leave(cell->box.lo, cell->box.hi);
+    }
+    detail.cells = rays.passed(i);
+    if (!rays.gone(i)) {
+      const uint32_t voxel[3] = {rays.voxel(i, 0), rays.voxel(i, 1), rays.voxel(i, 2)};
+      if (rays.moving(i) && cell->colour.alpha >= 1) {
+        ++detail.cells;
+        found(voxel, rays.t(i) * world_length(params, pixel_x, pixel_y), pixel, detail);
+        blend(cell->colour, 0, pixel);
+      } else {  // through what is translucent, or where doubles do not suffice
+        GridRay ray(params.start, ray_through(params, pixel_x, pixel_y).direction);
+        ray.resume(rays.t(i), voxel);
+        follow(params, ray, cursor, pixel_x, pixel_y, pixel, detail);
+      }
+    }
+    keep(pixel_x, pixel_y, pixel, detail);
+  }
+}
+
+/// The pixels of a tile: a cursor goes on where the last ray ended. `details` may be null. Packets are 2 x
+/// `packet_height` pixels.
+template <int packet_height, class View>
 [[gnu::always_inline]] inline void cast_tile(const CastParams& params, const View& view, const Rect& tile,
                                              Pixel* pixels, PixelDetail* details, Counts& count) {
   auto cursor = view.cursor();
-  for (int y = tile.y0; y < tile.y1; ++y) {
-    const int64_t row = static_cast<int64_t>(y) * params.width;
-    std::fill(pixels + row + tile.x0, pixels + row + tile.x1, Pixel{});
-    if (details != nullptr) std::fill(details + row + tile.x0, details + row + tile.x1, PixelDetail{});
-    if (y < params.top || y >= params.bottom) continue;
-    // Of this row, only left .. right may see something.
-    const int left = std::max(params.left, tile.x0), right = std::min(params.right, tile.x1);
-    Approach approaches[tile_width];
-    if constexpr (!std::is_same_v<View, BaselineView>)
-      for (int x = left; x < right; ++x) approaches[x - left] = approach(params, x, y);
-    for (int x = left; x < right; ++x) {
-      Pixel pixel;
-      PixelDetail detail;
-      if constexpr (std::is_same_v<View, BaselineView>)
-        follow_baseline(params, cursor, x, y, pixel, detail);
-      else
-        follow(params, approaches[x - left], cursor, x, y, pixel, detail);
-      pixels[row + x] = pixel;
-      count.hit += detail.voxel[0] >= 0;
-      count.cells += detail.cells;
-      if (details != nullptr) details[row + x] = detail;
-    }
+
+  const auto keep = [&](int x, int y, const Pixel& pixel, const PixelDetail& detail) {
+    const int64_t i = static_cast<int64_t>(y) * params.width + x;
+    pixels[i] = pixel;
+    count.hit += detail.voxel[0] >= 0;
+    count.cells += detail.cells;
+    if (details != nullptr) details[i] = detail;
+  };
+  const auto blank = [&](int x0, int x1, int y0, int y1) {
+    for (int y = y0; y < y1; ++y)
+      for (int x = x0; x < x1; ++x) keep(x, y, {}, {});
+  };
+  const auto cast_one_by_one = [&](int x0, int x1, int y0, int y1) {
+    for (int y = y0; y < y1; ++y)
+      for (int x = x0; x < x1; ++x) {
+        Pixel pixel;
+        PixelDetail detail;
+        cast_ray(params, cursor, x, y, pixel, detail);
+        keep(x, y, pixel, detail);
+      }
+  };
+  // Of the tile, only left .. right and top .. bottom may see something.
+  const int left = std::clamp(params.left, tile.x0, tile.x1), right = std::clamp(params.right, left, tile.x1),
+            top = std::clamp(params.top, tile.y0, tile.y1), bottom = std::clamp(params.bottom, top, tile.y1);
+  blank(tile.x0, tile.x1, tile.y0, top);
+  blank(tile.x0, left, top, bottom);
+  blank(right, tile.x1, top, bottom);
+  blank(tile.x0, tile.x1, bottom, tile.y1);
+  if constexpr (std::is_same_v<View, BoxedSvmmView>) {
+    VoidTrail trail;
+    const int x_end = right - (right - left) % 2, y_end = bottom - (bottom - top) % packet_height;
+    for (int y = top; y < y_end; y += packet_height)
+      for (int x = left; x < x_end; x += 2) cast_packet<2, packet_height>(params, cursor, trail, x, y, keep);
+    cast_one_by_one(x_end, right, top, y_end);
+    cast_one_by_one(left, right, y_end, bottom);
+  } else {
+    cast_one_by_one(left, right, top, bottom);
   }
   count.blocks = cursor.blocks();
   count.bytes = cursor.bytes();
 }
 
-// The same code for two kinds of machine.
+// The same code for two kinds of machine: packets fill a register.
 template <class View>
 void cast_tile_generic(const CastParams& params, const View& view, const Rect& tile, Pixel* pixels,
                        PixelDetail* details, Counts& count) {
-  cast_tile(params, view, tile, pixels, details, count);
+  cast_tile<1>(params, view, tile, pixels, details, count);
 }
 template <class View>
 [[gnu::target("avx2,bmi,bmi2,lzcnt,popcnt,fma")]] void cast_tile_avx2(const CastParams& params,
                                                                       const View& view, const Rect& tile,
                                                                       Pixel* pixels, PixelDetail* details,
                                                                       Counts& count) {
-  cast_tile(params, view, tile, pixels, details, count);
+  cast_tile<2>(params, view, tile, pixels, details, count);
 }
 
 bool has_avx2() {  // and with it lzcnt, which clang 14 cannot ask for

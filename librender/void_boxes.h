@@ -5,7 +5,7 @@
 #include <atomic>
 #include <memory>
 
-#include "librender/cast_kernel.h"
+#include "librender/ray_packet.h"
 #include "libsvmm/every_voxel.h"
 
 namespace voxkit::render {
@@ -35,12 +35,15 @@ class VoidMemo {
     const uint32_t version = slot.version.load(std::memory_order_acquire);
     bool found = version % 2 == 0 &&
                  slot.log2_edge.load(std::memory_order_acquire) == static_cast<uint32_t>(key.log2_edge + 1);
+    VoidBox there;
     for (int a = 0; a < 3; ++a) {
       found &= slot.corner[a].load(std::memory_order_acquire) == key.corner[a];
-      box.lo[a] = slot.lo[a].load(std::memory_order_acquire);
-      box.hi[a] = slot.hi[a].load(std::memory_order_acquire);
+      there.lo[a] = slot.lo[a].load(std::memory_order_acquire);
+      there.hi[a] = slot.hi[a].load(std::memory_order_acquire);
     }
-    return found && slot.version.load(std::memory_order_relaxed) == version;
+    if (!found || slot.version.load(std::memory_order_relaxed) != version) return false;
+    box = there;
+    return true;
   }
   /// Takes the place of another. Does nothing where someone else is at it.
   void insert(const Key& key, const VoidBox& box) {
@@ -74,37 +77,54 @@ class VoidMemo {
   std::unique_ptr<Slot[]> slots_;
 };
 
-/// Grows an aligned void cell as far as it remains void, first by as much as it is wide, then by less.
+/// Grows a void box as far as it remains void, to each side in turn by as much as it is wide there.
 template <class Every>
 VoidBox grow(VoidBox box, const int64_t (&dims)[3], Every& every) {
+  // How far it may get: what lies beyond is not void, however much wider the box becomes meanwhile.
+  VoidBox limit{
+      {}, {static_cast<uint32_t>(dims[0]), static_cast<uint32_t>(dims[1]), static_cast<uint32_t>(dims[2])}};
   for (bool grown = true; grown && every.budget() > 0;) {
     grown = false;
     for (int side = 0; side < 6; ++side) {
       const int a = side / 2;
-      const bool up = side % 2 == 0;
-      for (uint32_t step = box.hi[a] - box.lo[a]; step > 0; step /= 2) {
+      const uint32_t lo = box.lo[a], hi = box.hi[a];
+      for (;;) {
         VoidBox slab = box;
-        const auto room = up ? static_cast<uint32_t>(dims[a]) - box.hi[a] : box.lo[a];
-        const uint32_t by = std::min(step, room);
-        if (by == 0) break;
-        (up ? slab.lo : slab.hi)[a] = up ? box.hi[a] : box.lo[a];
-        (up ? slab.hi : slab.lo)[a] = up ? box.hi[a] + by : box.lo[a] - by;
-        if (!every(slab.lo, slab.hi)) continue;
-        (up ? box.hi : box.lo)[a] = (up ? slab.hi : slab.lo)[a];
-        grown = true;
+        if (side % 2 == 0) {
+          slab.lo[a] = hi;
+          slab.hi[a] = hi + std::min(hi - lo, limit.hi[a] - hi);
+        } else {
+          slab.hi[a] = lo;
+          slab.lo[a] = lo - std::min(hi - lo, lo - limit.lo[a]);
+        }
+        if (slab.lo[a] == slab.hi[a]) break;
+        if (every(slab.lo, slab.hi)) {
+          box.lo[a] = std::min(lo, slab.lo[a]);
+          box.hi[a] = std::max(hi, slab.hi[a]);
+          grown = true;
+          break;
+        }
+        if (!every.found()) return box;
+        if (side % 2 == 0)
+          limit.hi[a] = static_cast<uint32_t>(std::max<uint64_t>(every.begin(a), hi));
+        else
+          limit.lo[a] = static_cast<uint32_t>(std::min<uint64_t>(every.end(a), lo));
       }
     }
   }
   return box;
 }
 
-/// A cell, or the void box that was made of it.
+/// A cell of one value, or the void box that was made of it.
 struct BoxedCell {
   Voxel value;
-  int log2_edge;
-  const VoidBox* box = nullptr;
-  [[gnu::always_inline]] bool leave(GridRay& ray) const {
-    return log2_edge < 0 ? ray.leave(box->lo, box->hi) : ray.leave(log2_edge);
+  VoidBox box;
+  bool is_void;
+  Colour colour;  ///< unless it is void
+  [[gnu::always_inline]] bool leave(GridRay& ray) const { return ray.leave(box.lo, box.hi); }
+  [[gnu::always_inline]] bool holds(const uint32_t (&v)[3]) const {
+    return ((v[0] - box.lo[0] < box.hi[0] - box.lo[0]) & (v[1] - box.lo[1] < box.hi[1] - box.lo[1]) &
+            (v[2] - box.lo[2] < box.hi[2] - box.lo[2])) != 0;
   }
 };
 
@@ -119,73 +139,66 @@ struct BoxedSvmmView {
   class Cursor {
    public:
     explicit Cursor(const BoxedSvmmView& volume) : volume_(volume), walk_(*volume.view, *volume.pools) {}
-    [[gnu::always_inline]] BoxedCell locate(uint32_t x, uint32_t y, uint32_t z, int) {
-      // Most likely the void box that the ray before came to next, or the voxel in which it ended.
+    [[gnu::always_inline]] const BoxedCell& locate(uint32_t x, uint32_t y, uint32_t z, int) {
       const uint32_t v[3] = {x, y, z};
-      if (const Passed& next = trail_[passed_ % remembered]; next.holds(v)) {
-        ++passed_;
-        return {next.value, -1, &next.box};
-      }
-      if (last_.holds(v)) return {last_.value, last_.log2_edge, nullptr};
+      BoxedCell& known = recent_[(x + y * 11 + z * 57) % remembered];
+      if (known.holds(v)) return known;
       const auto cell = walk_.locate(x, y, z, -1);
-      if (!volume_.params->colour_of.is_void(cell.value)) {
-        for (int a = 0; a < 3; ++a) {
-          last_.box.lo[a] = v[a] >> cell.log2_edge << cell.log2_edge;
-          last_.size[a] = uint32_t{1} << cell.log2_edge;
-        }
-        last_.value = cell.value;
-        last_.log2_edge = cell.log2_edge;
-      } else if (cell.log2_edge >= volume_.least_log2) {
-        Passed& next = trail_[passed_++ % remembered];
-        next.value = cell.value;
-        next.box = grown(v, cell.log2_edge);
-        for (int a = 0; a < 3; ++a) next.size[a] = next.box.hi[a] - next.box.lo[a];
-        return {next.value, -1, &next.box};
+      known.value = cell.value;
+      for (int a = 0; a < 3; ++a) {
+        known.box.lo[a] = v[a] >> cell.log2_edge << cell.log2_edge;
+        known.box.hi[a] = static_cast<uint32_t>(
+            std::min(int64_t{known.box.lo[a]} + (int64_t{1} << cell.log2_edge), volume_.params->dims[a]));
       }
-      return {cell.value, cell.log2_edge, nullptr};
+      const ColourOf& colour_of = volume_.params->colour_of;
+      known.is_void = colour_of.is_void(cell.value);
+      if (!known.is_void)
+        known.colour = colour_of(cell.value);
+      else if (cell.log2_edge >= volume_.least_log2)
+        grow_cell(cell.log2_edge, known);
+      return known;
     }
-    /// A new ray.
-    void start() { passed_ = 0; }
     uint32_t blocks() const { return walk_.blocks_entered(); }
     uint32_t bytes() const { return walk_.bytes_read(); }
 
    private:
-    /// The void box of the void cell around a voxel.
-    [[gnu::noinline]] VoidBox grown(const uint32_t (&v)[3], int log2_edge) {
-      VoidMemo::Key key{{}, log2_edge};
-      VoidBox box;
-      for (int a = 0; a < 3; ++a) key.corner[a] = v[a] >> log2_edge << log2_edge;
-      if (volume_.memo->find(key, box)) return box;
-      for (int a = 0; a < 3; ++a) {
-        box.lo[a] = key.corner[a];
-        box.hi[a] = static_cast<uint32_t>(
-            std::min(int64_t{box.lo[a]} + (int64_t{1} << log2_edge), volume_.params->dims[a]));
-      }
+    /// Makes a void cell a box.
+    [[gnu::noinline]] void grow_cell(int log2_edge, BoxedCell& known) {
+      const VoidMemo::Key key{{known.box.lo[0], known.box.lo[1], known.box.lo[2]}, log2_edge};
+      if (volume_.memo->find(key, known.box)) return;
       const auto is_void = [this](const Voxel& value) { return volume_.params->colour_of.is_void(value); };
       svmm::EveryVoxel every(*volume_.view, *volume_.pools, is_void, 4096);
-      box = grow(box, volume_.params->dims, every);
-      volume_.memo->insert(key, box);
-      return box;
+      known.box = grow(known.box, volume_.params->dims, every);
+      volume_.memo->insert(key, known.box);
     }
 
-    static constexpr unsigned remembered = 32;
-    struct Passed {
-      VoidBox box{};
-      uint32_t size[3] = {};
-      Voxel value;
-      int log2_edge = 0;
-      [[gnu::always_inline]] bool holds(const uint32_t (&v)[3]) const {
-        return ((v[0] - box.lo[0] < size[0]) & (v[1] - box.lo[1] < size[1]) & (v[2] - box.lo[2] < size[2])) !=
-               0;
-      }
-    };
     const BoxedSvmmView& volume_;
     svmm::Walk<svmm::MappedPools> walk_;
-    Passed trail_[remembered];  ///< what the last rays came to, in the order of the way
-    Passed last_;               ///< the last voxel that was not void
-    unsigned passed_ = 0;       ///< by this ray
+    static constexpr uint32_t remembered = 128;
+    BoxedCell recent_[remembered] = {};  ///< cells of neighbouring voxels, which neighbouring rays meet
   };
   Cursor cursor() const { return Cursor(*this); }
+};
+
+/// The void boxes that a packet of rays came through, which are most likely those of the packet beside it.
+class VoidTrail {
+ public:
+  /// Moves rays through them, and forgets those in which no ray was.
+  template <class Rays>
+  [[gnu::always_inline]] void follow(Rays& rays) {
+    int kept = 0;
+    for (int i = 0; i < count_; ++i)
+      if (rays.leave(boxes_[i].lo, boxes_[i].hi)) boxes_[kept++] = boxes_[i];
+    count_ = kept;
+  }
+  [[gnu::always_inline]] void add(const VoidBox& box) {
+    if (count_ < most) boxes_[count_++] = box;
+  }
+
+ private:
+  static constexpr int most = 32;
+  VoidBox boxes_[most];
+  int count_ = 0;
 };
 
 }  // namespace voxkit::render

@@ -7,9 +7,8 @@
 
 namespace voxkit::svmm {
 
-/// Whether `is(value)` holds for every voxel lo <= v < hi, a box inside the volume. What it holds for must be
-/// such that it holds for a mean of voxels if it holds for each: being void, say. Looks at `budget` voxels at
-/// most, which it counts down; false where these do not suffice or a block is missing.
+/// Whether `is(value)` holds for every voxel lo <= v < hi, a box inside the volume. Looks at `budget`
+/// terminal voxels at most, which it counts down; false where these do not suffice or a block is missing.
 template <class Pools, class Is>
 class EveryVoxel {
  public:
@@ -17,9 +16,15 @@ class EveryVoxel {
       : view_(view), pools_(pools), is_(is), budget_(budget) {}
 
   bool operator()(const uint32_t (&lo)[3], const uint32_t (&hi)[3]) {
+    found_ = false;
     return inside(view_.root, pools_.block(view_.root, 0), lo, hi, {});
   }
   int budget() const { return budget_; }
+  /// Of a box for which it does not hold: whether that is since a terminal voxel was found for which it does
+  /// not, and where along an axis that voxel lies, begin <= v < end.
+  bool found() const { return found_; }
+  uint64_t begin(int axis) const { return uint64_t{at_[axis]} << shift_; }
+  uint64_t end(int axis) const { return (uint64_t{at_[axis]} + 1) << shift_; }
 
  private:
   bool inside(int k, const std::byte* block, const uint32_t (&lo)[3], const uint32_t (&hi)[3],
@@ -35,7 +40,7 @@ class EveryVoxel {
           if (--budget_ < 0) return false;
           const Index3 v(x & level.within, y & level.within, z & level.within);
           if (k == 0) {
-            if (!is_(base_voxel(block, v, parent))) return false;
+            if (!is_(base_voxel(block, v, parent))) return found({x, y, z}, level.shift);
             continue;
           }
           const int64_t index = voxel_index(v, level.size);
@@ -43,25 +48,30 @@ class EveryVoxel {
           const Voxel value = here.value(index);
           const int i = static_cast<int>(index % 8);
           if (!(link.mask >> i & 1u)) {
-            if (!is_(decoded_value(value, view_.format))) return false;
+            if (!is_(decoded_value(value, view_.format))) return found({x, y, z}, level.shift);
             continue;
           }
           const uint32_t at[3] = {x, y, z};
           uint32_t from[3], to[3];
-          bool all_of_it = true;
+
           for (int a = 0; a < 3; ++a) {
-            const uint64_t begin = uint64_t{at[a]} << level.shift, end = (uint64_t{at[a]} + 1) << level.shift;
-            from[a] = static_cast<uint32_t>(std::max<uint64_t>(lo[a], begin));
-            to[a] = static_cast<uint32_t>(std::min<uint64_t>(hi[a], end));
-            all_of_it &= to[a] - from[a] == end - begin;
+            const uint64_t first_voxel = uint64_t{at[a]} << level.shift;
+            from[a] = static_cast<uint32_t>(std::max<uint64_t>(lo[a], first_voxel));
+            to[a] =
+                static_cast<uint32_t>(std::min<uint64_t>(hi[a], first_voxel + (uint64_t{1} << level.shift)));
           }
-          // What the mean is not, not all of its voxels are.
-          if (all_of_it && !is_(decoded_value(value, view_.format))) return false;
+
           if (!inside(k - 1, pools_.block(k - 1, link.child(i)), from, to, value)) return false;
         }
     return true;
   }
 
+  bool found(const uint32_t (&at)[3], int shift) {
+    for (int a = 0; a < 3; ++a) at_[a] = at[a];
+    shift_ = shift;
+    found_ = true;
+    return false;
+  }
   Voxel base_voxel(const std::byte* block, Index3 v, const Voxel& parent) const {
     const LevelView& level = view_.levels[0];
     if (view_.base == Base::raw && view_.layout == Layout::plain && view_.format == VoxelFormat::rgba32)
@@ -73,6 +83,9 @@ class EveryVoxel {
   const Pools& pools_;
   const Is& is_;
   int budget_;
+  bool found_ = false;
+  uint32_t at_[3] = {};
+  int shift_ = 0;
 };
 
 }  // namespace voxkit::svmm

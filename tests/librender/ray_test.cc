@@ -65,7 +65,7 @@ GridRay make(const ExactRay& ray) {
     dims[a] = ray.dims[a];
   }
   const RayOrigin origin(o, dims);
-  return GridRay(origin, Approach(origin, d));
+  return GridRay(origin, d);
 }
 
 Voxel3 voxel_of(const GridRay& ray) {
@@ -162,7 +162,7 @@ TEST(GridRay, ExtremeDirections) {
   for (const double tiny : {0.0, -0.0, 1e-310, -5e-324, 1e-80}) {
     const double o[3] = {-1000000.0, 3.5, 7.0}, d[3] = {1, tiny, tiny};
     const RayOrigin origin(o, dims);
-    GridRay ray(origin, Approach(origin, d));
+    GridRay ray(origin, d);
     ASSERT_TRUE(ray.enter());
     EXPECT_EQ(ray.t(), 1000000.0);
     EXPECT_EQ(voxel_of(ray)[1], 3);

@@ -61,7 +61,7 @@ double relative_error(double t, long double exact) {
 
 GridRay make(const TestRay& ray, const Start& start) {
   const render::RayOrigin origin(start.origin, ray.dims);
-  return GridRay(origin, render::Approach(origin, start.direction));
+  return GridRay(origin, start.direction);
 }
 
 /// GridRay beside the exact path, whichever way that is found.
