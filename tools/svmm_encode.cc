@@ -3,15 +3,12 @@
 
 #include <algorithm>
 #include <cmath>
-#include <cstdio>
 
 #include "formats/copy.h"
 #include "formats/full_scale.h"
 #include "formats/output_file.h"
-#include "libmetrics/volume_diff.h"
 #include "libsvmm/svmm.h"
-#include "tools/common/input.h"
-#include "tools/common/main.h"
+#include "tools/common/encoding.h"
 #include "tools/common/retype.h"
 #include "tools/common/svmm_report.h"
 
@@ -82,29 +79,6 @@ Result<svmm::Params> params_of(const Options& o, VoxelFormat format) {
   return params;
 }
 
-/// Opens the input, any number of times: standard input is spooled to disk if it may be wanted twice.
-class Inputs {
- public:
-  Inputs(const Options& o, Context& ctx) : options_(o), ctx_(ctx) {}
-  Result<std::unique_ptr<VolumeSource>> open(bool wanted_again) {
-    if (options_.input != "-" || (!wanted_again && !spooled_)) {
-      VOX_TRY(Input input, open_input(options_.input, options_.open, ctx_));
-      return std::move(input.source);
-    }
-    if (!spooled_) {
-      VOX_TRY(auto stream, open_stream("-"));
-      VOX_TRY(spooled_, MappedFile::spool(*stream));
-    }
-    VOX_TRY(Input input, open_spooled(spooled_, ctx_));
-    return std::move(input.source);
-  }
-
- private:
-  const Options& options_;
-  Context& ctx_;
-  std::shared_ptr<const MappedFile> spooled_;
-};
-
 /// Lossless means identical; bound global with a raw base promises a distance.
 bool keeps_promise(const svmm::Params& params, const VolumeDiff& diff) {
   if (params.base != svmm::Base::raw || params.layout != svmm::Layout::plain)
@@ -113,35 +87,18 @@ bool keeps_promise(const svmm::Params& params, const VolumeDiff& diff) {
   return params.bound == svmm::Bound::local || diff.max_distance <= params.delta * params.full_scale;
 }
 
-Json json_of(const Options& o, const Run& run, const VolumeInfo& info, const svmm::Params& params,
-             std::span<const svmm::Level> levels, uint64_t file_bytes, double seconds,
-             const std::optional<VolumeDiff>& diff) {
-  const double raw = static_cast<double>(raw_bytes(info)), bytes = static_cast<double>(file_bytes);
-  Json json = Json::result();
-  json.set("tool", run.tool).set("version", version_text()).set("input", o.input).set("output", o.output);
-  json.set("dims", info.dims).set("voxel_format", name(info.format)).set("raw_bytes", raw_bytes(info));
-  json.set("file_bytes", file_bytes).set("percent", 100 * bytes / raw).set("ratio", raw / bytes);
-  json.set("bits_per_voxel", 8 * bytes / static_cast<double>(*checked_voxels(info.dims)));
-  json.set("encode_seconds", seconds).set("input_mb_per_s", raw / 1e6 / seconds);
-  json.set("peak_rss_bytes", peak_rss_bytes())
-      .set("params", params_json(params))
-      .set("threads", run.options.threads);
+Json json_of(const Encoding& encoding, const Run& run, const svmm::Params& params,
+             std::span<const svmm::Level> levels) {
+  Json json = encoding_json(encoding, run, params_json(params));
   if (params.layout == svmm::Layout::thesis) json.set("thesis_bytes", svmm::thesis_bytes(levels));
   json.set("levels", levels_json(levels));
-  if (diff)
-    json.set("rmse", diff->rmse).set("psnr_db", diff->psnr_db).set("max_abs_error", diff->max_abs_error);
+  add_verified(encoding, json);
   return json;
 }
 
 Result<int> work(const Options& o, Run& run) {
-  if (run.options.json && o.output == "-")
-    return bad_usage("--json and the output - both use standard output");
-  VOX_CHECK(check_output(o.output, run.options.force));
-  VOX_CHECK(check_distinct(o.input, o.output));
-  if (o.verify && o.output == "-")
-    return bad_usage("--verify: cannot read back what went to standard output: name a file");
-
-  Inputs inputs(o, run.ctx);
+  VOX_CHECK(check_encoding(o.input, o.output, o.verify, run));
+  Inputs inputs(o.input, o.open, run.ctx);
   const bool lossless = o.delta ? *o.delta == 0 : o.quality.value_or(90) == 100;
   VOX_TRY(auto source, inputs.open(o.verify || (!lossless && !o.range)));
   const VolumeInfo info = source->info();
@@ -164,36 +121,26 @@ Result<int> work(const Options& o, Run& run) {
   const double start = run.seconds();
   VOX_TRY(const auto levels, svmm::encode(
                                  *source, params, [&](auto bytes) { return out->write(bytes); }, run.ctx));
-  const double seconds = run.seconds() - start;
-  const uint64_t file_bytes = out->position();
+  Encoding encoding{o.input, o.output, info, out->position(), run.seconds() - start, {}};
 
-  std::optional<VolumeDiff> diff;
   if (o.verify) {
     run.stage("verify");
     if (source->forward_only()) {
       VOX_TRY(source, inputs.open(true));
     }
     VOX_TRY(const Input decoded, open_compressed(out->temporary(), 0, run.ctx));
-    VOX_TRY(diff, diff_volumes(*source, *decoded.source, std::nullopt, nullptr, run.ctx));
-    if (!keeps_promise(params, *diff)) {
+    VOX_TRY(encoding.diff, diff_volumes(*source, *decoded.source, std::nullopt, nullptr, run.ctx));
+    if (!keeps_promise(params, *encoding.diff)) {
       report(run.tool,
              {ErrorCode::internal, o.output,
               fmt::format("verification failed: greatest error {}: expected at most {}; nothing was written",
-                          diff->max_distance, params.delta * params.full_scale)});
+                          encoding.diff->max_distance, params.delta * params.full_scale)});
       return 1;
     }
   }
   VOX_CHECK(out->commit());
-  if (run.options.json)
-    VOX_CHECK(print(json_of(o, run, info, params, levels, file_bytes, seconds, diff).text()));
-  if (!run.options.quiet && !run.options.json) {
-    const double raw = static_cast<double>(raw_bytes(info));
-    fmt::print(
-        stderr, "{}: {} -> {} bytes ({:.4g} %) in {:.2f} s{}\n", o.output, raw_bytes(info), file_bytes,
-        100 * static_cast<double>(file_bytes) / raw, seconds,
-        diff ? fmt::format(", {} dB, greatest error {:.6g}", readable(diff->psnr_db), diff->max_abs_error)
-             : "");
-  }
+  if (run.options.json) VOX_CHECK(print(json_of(encoding, run, params, levels).text()));
+  if (!run.options.quiet && !run.options.json) print_encoding(encoding);
   return 0;
 }
 

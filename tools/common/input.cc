@@ -21,14 +21,22 @@ Result<std::shared_ptr<const Container>> container_of(std::shared_ptr<const Mapp
   return Container::open(bytes, name, std::move(file));
 }
 
-Result<Input> open_svmm(std::shared_ptr<const Container> container, int level) {
-  Input input;
-  VOX_TRY(input.svmm, svmm::Volume::open(std::move(container)));
-  const auto levels = static_cast<int>(input.svmm->levels().size());
-  if (level >= levels)
+Result<Input> open_codec(std::shared_ptr<const Container> container, int level) {
+  const auto check_level = [&](int levels) -> Status {
+    if (level < levels) return {};
     return fail(
-        ErrorCode::usage, input.svmm->container().name(),
+        ErrorCode::usage, container->name(),
         "--level " + std::to_string(level) + ": expected a level from 0 to " + std::to_string(levels - 1));
+  };
+  Input input;
+  if (container->codec() == Codec::vq) {
+    VOX_CHECK(check_level(1));
+    VOX_TRY(input.vq, vq::Volume::open(std::move(container)));
+    input.source = vq::open_source(input.vq);
+    return input;
+  }
+  VOX_TRY(input.svmm, svmm::Volume::open(container));
+  VOX_CHECK(check_level(static_cast<int>(input.svmm->levels().size())));
   VOX_TRY(input.source, svmm::open_source(input.svmm, level));
   return input;
 }
@@ -77,7 +85,7 @@ void declare_input_options(CommandLine& line, OpenOptions& options, bool type) {
 }
 
 bool is_compressed(const std::string& name) {
-  return has_ending(name, ".svmm");
+  return has_ending(name, ".svmm") || has_ending(name, ".vqv");
 }
 
 Result<std::shared_ptr<const Container>> open_container(const std::string& name) {
@@ -92,13 +100,13 @@ Result<std::shared_ptr<const Container>> open_container(const std::string& name)
 
 Result<Input> open_compressed(const std::string& name, int level, Context&) {
   VOX_TRY(auto container, open_container(name));
-  return open_svmm(std::move(container), level);
+  return open_codec(std::move(container), level);
 }
 
 Result<Input> open_spooled(std::shared_ptr<const MappedFile> file, Context& ctx) {
   if (is_container(file->bytes())) {
     VOX_TRY(auto container, container_of(std::move(file)));
-    return open_svmm(std::move(container), 0);
+    return open_codec(std::move(container), 0);
   }
   Input input;
   VOX_TRY(input.source, open_nrrd(stream_of(std::move(file)), ctx));

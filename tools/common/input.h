@@ -8,13 +8,15 @@
 
 #include "formats/open_volume.h"
 #include "libsvmm/svmm.h"
+#include "libvq/vq.h"
 #include "tools/common/command_line.h"
 
 namespace voxkit::cli {
 
 struct Input {
   std::unique_ptr<VolumeSource> source;
-  std::shared_ptr<const svmm::Volume> svmm;  ///< null for plain volumes
+  std::shared_ptr<const svmm::Volume> svmm;  ///< null for all but .svmm
+  std::shared_ptr<const vq::Volume> vq;      ///< null for all but .vqv
 };
 
 /// Declares --dims, --endian and --grid, and with `type` also --type as the type of a .raw input.

@@ -1,0 +1,100 @@
+#include "libvq/quantise.h"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cmath>
+#include <cstring>
+
+#include "libvq/layout.h"
+
+namespace voxkit::vq {
+namespace {
+
+bool holds_integers(SampleType type) {
+  return type != SampleType::f32 && type != SampleType::f64;
+}
+
+/// Values of the volume, in an integer format.
+int stored_values(VoxelFormat format) {
+  return format == VoxelFormat::density16 ? 65536 : format == VoxelFormat::bitmap ? 2 : 256;
+}
+
+}  // namespace
+
+Result<Quantiser> Quantiser::make(const Options& options, const VolumeInfo& info) {
+  Quantiser q;
+  q.format_ = info.format;
+  if (info.format != VoxelFormat::float32) {
+    const auto error = static_cast<int64_t>(std::min(std::floor(options.max_error.value_or(0)), 65535.0));
+    if (error == 0) return q;
+    // Aligned so that the sample 0 is exact: it is often void.
+    const int64_t step = 2 * error + 1, shift = (step - info.bias() % step) % step;
+    q.step_ = static_cast<double>(step);
+    q.origin_ = static_cast<double>(-shift);
+    q.bound_ = static_cast<double>(error);
+    for (int64_t v = 0; v < stored_values(info.format); ++v)
+      q.code_of_.push_back(static_cast<uint16_t>((v + shift + error) / step));
+    return q;
+  }
+  const double lo = options.range.lo, hi = options.range.hi;
+  q.lo_ = q.origin_ = lo;
+  q.hi_ = hi;
+  if (!options.max_error && holds_integers(info.sample_type) && hi - lo <= 65535) {
+    return q;  // whole numbers that fit stay what they are
+  }
+  // Decoding rounds to a float: by so much at most.
+  const double rounding = std::ldexp(std::max(std::abs(lo), std::abs(hi)), -24);
+  if (options.max_error) {
+    q.bound_ = *options.max_error;
+    q.step_ = 2 * (q.bound_ - rounding) * (1 - 1e-12);
+    if (!(q.step_ > 0) || (hi - lo) / q.step_ > 65534.5)
+      return bad_usage(fmt::format(
+          "--max-error {}: too small for 65536 levels of the values {} to {}: expected {:.6g} or more",
+          *options.max_error, lo, hi, ((hi - lo) / 65534 / 2 + rounding) * (1 + 1e-9)));
+  } else {
+    q.step_ = hi > lo ? (hi - lo) / 65535 : 1;
+    q.bound_ = hi > lo ? q.step_ / 2 * (1 + 1e-12) + rounding : 0;
+  }
+  return q;
+}
+
+uint16_t Quantiser::code(const Voxel& voxel) const {
+  uint16_t code = 0;
+  double ignored = 0;
+  codes(voxel.bytes.data(), 1, &code, ignored);
+  return code;
+}
+
+void Quantiser::codes(const std::byte* voxels, int64_t count, uint16_t* out, double& greatest_error) const {
+  if (format_ == VoxelFormat::float32) {
+    const double levels = 1 / step_;
+    for (int64_t i = 0; i < count; ++i) {
+      float value;
+      std::memcpy(&value, voxels + 4 * i, sizeof value);
+      // Not a number compares as false: it becomes the least value, like minus infinity.
+      const double inside = value > lo_ ? std::min<double>(value, hi_) : lo_;
+      out[i] = static_cast<uint16_t>(std::clamp(std::floor((inside - origin_) * levels + 0.5), 0.0, 65535.0));
+      if (std::isfinite(value)) {
+        const auto decoded = voxel_of(out[i], format_, origin_, step_).as<float>();
+        greatest_error = std::max(greatest_error, std::abs(static_cast<double>(decoded) - value));
+      }
+    }
+    return;
+  }
+  if (format_ == VoxelFormat::density16) {
+    std::memcpy(out, voxels, static_cast<size_t>(count) * 2);
+  } else {
+    for (int64_t i = 0; i < count; ++i) out[i] = std::to_integer<uint16_t>(voxels[i]);
+  }
+  if (code_of_.empty()) return;
+  const double most = stored_values(format_) - 1;
+  for (int64_t i = 0; i < count; ++i) {
+    const auto value = static_cast<double>(out[i]);
+    out[i] = code_of_[out[i]];
+    const double decoded = std::clamp(origin_ + step_ * out[i], 0.0, most);
+    greatest_error = std::max(greatest_error, std::abs(decoded - value));
+  }
+}
+
+}  // namespace voxkit::vq

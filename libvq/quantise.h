@@ -1,0 +1,34 @@
+// From voxels to codes of up to 16 bits, and what is lost on the way.
+#pragma once
+
+#include <vector>
+
+#include "libvq/vq.h"
+
+namespace voxkit::vq {
+
+/// How voxels of a volume become codes: the nearest multiple of a step from an origin.
+class Quantiser {
+ public:
+  /// Codes are those of `Options::max_error`. ErrorCode::usage where 16 bits do not suffice for it.
+  static Result<Quantiser> make(const Options& options, const VolumeInfo& info);
+
+  /// Codes of a row of `count` voxels; `greatest_error` becomes at least that of its finite samples.
+  void codes(const std::byte* voxels, int64_t count, uint16_t* out, double& greatest_error) const;
+  uint16_t code(const Voxel& voxel) const;
+
+  /// A code stands for origin + step * code.
+  double origin() const { return origin_; }
+  double step() const { return step_; }
+  /// The greatest error that a finite voxel may have.
+  double bound() const { return bound_; }
+
+ private:
+  VoxelFormat format_{};
+  double origin_ = 0, step_ = 1, bound_ = 0;
+  double lo_ = 0, hi_ = 0;  ///< FLOAT32: what is outside is brought to these
+  std::vector<uint16_t>
+      code_of_;  ///< of every stored value of an integer format; empty where nothing changes
+};
+
+}  // namespace voxkit::vq

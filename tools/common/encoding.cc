@@ -1,0 +1,65 @@
+#include "tools/common/encoding.h"
+
+#include <fmt/core.h>
+
+#include <cstdio>
+#include <utility>
+
+#include "formats/input_stream.h"
+#include "formats/output_file.h"
+
+namespace voxkit::cli {
+
+Result<std::unique_ptr<VolumeSource>> Inputs::open(bool wanted_again) {
+  if (name_ != "-" || (!wanted_again && !spooled_)) {
+    VOX_TRY(Input input, open_input(name_, open_, ctx_));
+    return std::move(input.source);
+  }
+  if (!spooled_) {
+    VOX_TRY(auto stream, open_stream("-"));
+    VOX_TRY(spooled_, MappedFile::spool(*stream));
+  }
+  VOX_TRY(Input input, open_spooled(spooled_, ctx_));
+  return std::move(input.source);
+}
+
+Status check_encoding(const std::string& input, const std::string& output, bool verify, const Run& run) {
+  if (run.options.json && output == "-") return bad_usage("--json and the output - both use standard output");
+  VOX_CHECK(check_output(output, run.options.force));
+  VOX_CHECK(check_distinct(input, output));
+  if (verify && output == "-")
+    return bad_usage("--verify: cannot read back what went to standard output: name a file");
+  return {};
+}
+
+Json encoding_json(const Encoding& e, const Run& run, Json params) {
+  const double raw = static_cast<double>(raw_bytes(e.info)), bytes = static_cast<double>(e.file_bytes);
+  Json json = Json::result();
+  json.set("tool", run.tool).set("version", version_text()).set("input", e.input).set("output", e.output);
+  json.set("dims", e.info.dims).set("voxel_format", name(e.info.format)).set("raw_bytes", raw_bytes(e.info));
+  json.set("file_bytes", e.file_bytes).set("percent", 100 * bytes / raw).set("ratio", raw / bytes);
+  json.set("bits_per_voxel", 8 * bytes / static_cast<double>(*checked_voxels(e.info.dims)));
+  json.set("encode_seconds", e.seconds).set("input_mb_per_s", raw / 1e6 / e.seconds);
+  json.set("peak_rss_bytes", peak_rss_bytes())
+      .set("params", std::move(params))
+      .set("threads", run.options.threads);
+  return json;
+}
+
+void add_verified(const Encoding& e, Json& json) {
+  if (e.diff)
+    json.set("rmse", e.diff->rmse)
+        .set("psnr_db", e.diff->psnr_db)
+        .set("max_abs_error", e.diff->max_abs_error);
+}
+
+void print_encoding(const Encoding& e) {
+  const double raw = static_cast<double>(raw_bytes(e.info));
+  fmt::print(
+      stderr, "{}: {} -> {} bytes ({:.4g} %) in {:.2f} s{}\n", e.output, raw_bytes(e.info), e.file_bytes,
+      100 * static_cast<double>(e.file_bytes) / raw, e.seconds,
+      e.diff ? fmt::format(", {} dB, greatest error {:.6g}", readable(e.diff->psnr_db), e.diff->max_abs_error)
+             : "");
+}
+
+}  // namespace voxkit::cli

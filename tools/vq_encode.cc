@@ -1,0 +1,138 @@
+// vq-encode: a volume as a codebook of 4^3 bricks.
+#include <fmt/core.h>
+
+#include <algorithm>
+#include <limits>
+#include <numeric>
+
+#include "formats/copy.h"
+#include "formats/output_file.h"
+#include "libvq/vq.h"
+#include "tools/common/encoding.h"
+#include "tools/common/vq_report.h"
+
+namespace voxkit::cli {
+namespace {
+
+struct Options {
+  std::string input, output;
+  OpenOptions open;
+  bool lossless = false;
+  std::string codebook = "rbuc", offsets = "auto";
+  std::optional<double> max_error;
+  bool verify = false;
+};
+
+void declare(CommandLine& line, Options& o) {
+  line.argument("INPUT", "Volume file, folder or pattern of images, built-in such as sphere:64, or -",
+                o.input);
+  line.text("-o,--output", "OUT", "Output (.vqv), or -", o.output, true);
+  line.flag("--lossless", "Every voxel as it is; floats are refused (default, but floats get 65536 levels)",
+            o.lossless);
+  line.option("--max-error", "E", "No voxel is further than this from the original, in sample values",
+              number(o.max_error, 0, std::numeric_limits<double>::max()));
+  line.option("--codebook", "BOOK", "rbuc: codewords of variable length; packed: larger, faster (rbuc)",
+              one_of(o.codebook, {"rbuc", "packed"}));
+  line.option("--offsets", "MAP",
+              "What places say: direct: addresses; indirect: numbers; auto: the smaller (auto)",
+              one_of(o.offsets, {"auto", "direct", "indirect"}));
+  line.flag("--verify",
+            "Decode and compare before the output appears; exit 1 if the promised bound is broken", o.verify);
+  declare_input_options(line, o.open);
+}
+
+Result<vq::Options> encoder_options(const Options& o) {
+  vq::Options options;
+  if (o.lossless && o.max_error) return bad_usage("--lossless and --max-error: expected one of them");
+  options.max_error = o.max_error;
+  if (o.codebook == "packed") options.codebook = vq::Codebook::packed;
+  if (o.offsets == "direct") options.mapping = vq::Mapping::direct;
+  if (o.offsets == "indirect") options.mapping = vq::Mapping::indirect;
+  return options;
+}
+
+bool keeps_promise(const vq::Params& params, const VolumeDiff& diff) {
+  if (params.max_error < 0) return true;
+  if (params.max_error == 0 && diff.voxel_format != VoxelFormat::float32) return diff.differing_voxels == 0;
+  return diff.max_abs_error <= params.max_error;
+}
+
+Json json_of(const Encoding& encoding, const Run& run, const vq::Report& report) {
+  Json json = encoding_json(encoding, run, params_json(report.params));
+  json.set("bricks", report.bricks);
+  add_sizes(report.params, json);
+  const auto& counts = report.transform_codewords;
+  const double all =
+      static_cast<double>(std::max<uint64_t>(1, std::accumulate(counts.begin(), counts.end(), uint64_t{0})));
+  Json shares = Json::array();
+  for (const uint64_t count : counts) shares.push(static_cast<double>(count) / all);
+  json.set("transform_share", std::move(shares)).set("quantisation_error", report.quantisation_error);
+  add_verified(encoding, json);
+  return json;
+}
+
+Result<int> work(const Options& o, Run& run) {
+  VOX_CHECK(check_encoding(o.input, o.output, o.verify, run));
+  VOX_TRY(vq::Options options, encoder_options(o));
+
+  Inputs inputs(o.input, o.open, run.ctx);
+  // Of floats the range must be known first. What kind of voxels there are, the input tells only when it is
+  // open.
+  VOX_TRY(auto source, inputs.open(true));
+  const VolumeInfo info = source->info();
+  VOX_CHECK(vq::validate(options, info));
+  if (info.format == VoxelFormat::float32) {
+    run.stage("measure");
+    VOX_TRY(options.range, measure_range(*source, run.ctx));
+    if (source->forward_only()) {
+      VOX_TRY(source, inputs.open(true));
+    }
+  }
+  VOX_TRY(const double bound, vq::error_bound(options, info));
+  if (o.lossless && bound > 0)
+    return bad_usage(fmt::format(
+        "--lossless: 16 bits do not hold these {} voxels: expected none, or --max-error", name(info.format)));
+
+  VOX_TRY(auto out, OutputFile::create(o.output, run.options.force));
+  run.stage("encode");
+  const double start = run.seconds();
+  VOX_TRY(const vq::Report report,
+          vq::encode(
+              *source, options, [&](auto bytes) { return out->write(bytes); }, run.ctx));
+  Encoding encoding{o.input, o.output, info, out->position(), run.seconds() - start, {}};
+
+  if (o.verify) {
+    run.stage("verify");
+    if (source->forward_only()) {
+      VOX_TRY(source, inputs.open(true));
+    }
+    VOX_TRY(const Input decoded, open_compressed(out->temporary(), 0, run.ctx));
+    VOX_TRY(encoding.diff, diff_volumes(*source, *decoded.source, std::nullopt, nullptr, run.ctx));
+    if (!keeps_promise(report.params, *encoding.diff)) {
+      cli::report(
+          run.tool,
+          {ErrorCode::internal, o.output,
+           fmt::format("verification failed: greatest error {}: expected at most {}; nothing was written",
+                       encoding.diff->max_abs_error, report.params.max_error)});
+      return 1;
+    }
+  }
+  VOX_CHECK(out->commit());
+  if (run.options.json) VOX_CHECK(print(json_of(encoding, run, report).text()));
+  if (!run.options.quiet && !run.options.json) print_encoding(encoding);
+  return 0;
+}
+
+}  // namespace
+}  // namespace voxkit::cli
+
+int main(int argc, char** argv) {
+  using namespace voxkit::cli;
+  Options options;
+  return run_tool(
+      argc, argv, "vq-encode", "Compresses a scalar volume as a codebook of 4x4x4 bricks.",
+      "  vq-encode head.nii.gz -o head.vqv\n"
+      "  vq-encode head.nii.gz -o head.vqv --max-error 2 --verify\n"
+      "  vq-encode scan.raw --dims 512,512,361 --type u16 -o - > scan.vqv\n",
+      [&](CommandLine& line) { declare(line, options); }, [&](Run& run) { return work(options, run); });
+}
