@@ -41,7 +41,7 @@ class Collector {
     uint64_t bytes = 0;
     if (__builtin_mul_overflow(product(blocks_), block_bricks * sizeof(uint32_t), &bytes))
       bytes = std::numeric_limits<uint64_t>::max() / 2;
-    VOX_CHECK(out_.reservation.add(bytes, "the numbers of bricks"));
+    VOX_CHECK(out_.reservation.add(bytes, "the offset volume"));
     const int64_t runs_x = (blocks_.x + run_blocks - 1) / run_blocks, runs = runs_x * blocks_.y;
     const int64_t batch = std::min<int64_t>(int64_t{16} * ctx_.threads, runs);
     const uint64_t run_bytes =

@@ -40,30 +40,26 @@ Result<Quantiser> Quantiser::make(const Options& options, const VolumeInfo& info
   const double lo = options.range.lo, hi = options.range.hi;
   q.lo_ = q.origin_ = lo;
   q.hi_ = hi;
-  if (!options.max_error && holds_integers(info.sample_type) && hi - lo <= 65535) {
-    return q;  // whole numbers that fit stay what they are
+  const bool whole = holds_integers(info.sample_type) && hi - lo <= 65535;
+  if (hi == lo || (whole && !options.max_error)) {  // codes that are exact
+    q.bound_ = options.max_error.value_or(0);
+    return q;
   }
   // Decoding rounds to a float: by so much at most.
-  const double rounding = std::ldexp(std::max(std::abs(lo), std::abs(hi)), -24);
+  const double rounding = std::ldexp(std::max({std::abs(lo), std::abs(hi), 0x1p-126}), -24);
   if (options.max_error) {
     q.bound_ = *options.max_error;
     q.step_ = 2 * (q.bound_ - rounding) * (1 - 1e-12);
     if (!(q.step_ > 0) || (hi - lo) / q.step_ > 65534.5)
-      return bad_usage(fmt::format(
-          "--max-error {}: too small for 65536 levels of the values {} to {}: expected {:.6g} or more",
-          *options.max_error, lo, hi, ((hi - lo) / 65534 / 2 + rounding) * (1 + 1e-9)));
+      return bad_usage(
+          fmt::format("--max-error {:.6g}: too small for 65536 levels of the values {:.6g} to {:.6g}: "
+                      "expected {:.6g} or more",
+                      *options.max_error, lo, hi, ((hi - lo) / 65534 / 2 + rounding) * (1 + 1e-9)));
   } else {
-    q.step_ = hi > lo ? (hi - lo) / 65535 : 1;
-    q.bound_ = hi > lo ? q.step_ / 2 * (1 + 1e-12) + rounding : 0;
+    q.step_ = (hi - lo) / 65535;
+    q.bound_ = q.step_ / 2 * (1 + 1e-12) + rounding;
   }
   return q;
-}
-
-uint16_t Quantiser::code(const Voxel& voxel) const {
-  uint16_t code = 0;
-  double ignored = 0;
-  codes(voxel.bytes.data(), 1, &code, ignored);
-  return code;
 }
 
 void Quantiser::codes(const std::byte* voxels, int64_t count, uint16_t* out, double& greatest_error) const {

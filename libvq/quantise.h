@@ -15,7 +15,6 @@ class Quantiser {
 
   /// Codes of a row of `count` voxels; `greatest_error` becomes at least that of its finite samples.
   void codes(const std::byte* voxels, int64_t count, uint16_t* out, double& greatest_error) const;
-  uint16_t code(const Voxel& voxel) const;
 
   /// A code stands for origin + step * code.
   double origin() const { return origin_; }

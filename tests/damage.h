@@ -52,11 +52,11 @@ inline void reseal(Bytes& file) {
 
 /// Also makes right what opening a container asks of the header and the trailer, whatever the length has
 /// become.
-inline void repair(Bytes& file) {
+inline void repair(Bytes& file, Codec codec = Codec::svmm) {
   if (file.size() < 128) return;
   std::memcpy(file.data(), container_magic.data(), container_magic.size());
   store_le(&file[8], container_version);
-  store_le(&file[10], static_cast<uint16_t>(Codec::svmm));
+  store_le(&file[10], static_cast<uint16_t>(codec));
   std::byte* const trailer = &file[file.size() - 64];
   std::memcpy(trailer, "VOXTABLE", 8);
   const uint64_t entries = load_le<uint64_t>(trailer + 16) % ((file.size() - 128) / 64 + 1);

@@ -21,7 +21,7 @@ struct Options {
 };
 
 void declare(CommandLine& line, Options& o) {
-  line.argument("FILE", "Compressed volume (.svmm), or -", o.input);
+  line.argument("FILE", "Compressed volume (.svmm, .vqv), or -", o.input);
   line.text("-o,--output", "OUT", "Volume file, pattern such as slice-%04d.tif, or -", o.output, true);
   line.option("--roi", "BOX", "X0,Y0,Z0,X1,Y1,Z1: part of the volume, half open, in voxels of level 0",
               box(o.roi));
@@ -39,13 +39,15 @@ Result<int> work(const Options& o, Run& run) {
   VOX_TRY(Input input, open_compressed(o.input, o.level, run.ctx));
   auto source = std::move(input.source);
   if (o.roi) {
-    const Index3 dims = input.svmm->info().dims;
-    if (!input.svmm->info().box().contains(*o.roi))
+    const VolumeInfo& whole = input.svmm ? input.svmm->info() : input.vq->info();
+    const Index3 dims = whole.dims;
+    if (!whole.box().contains(*o.roi))
       return bad_usage(
           fmt::format("--roi: the box is not inside the volume: expected one inside 0,0,0,{},{},{}", dims.x,
                       dims.y, dims.z));
     // Every voxel of the level that the box touches.
-    const auto factor = static_cast<int64_t>(input.svmm->levels()[static_cast<size_t>(o.level)].mip_factor);
+    const int64_t factor =
+        input.svmm ? static_cast<int64_t>(input.svmm->levels()[static_cast<size_t>(o.level)].mip_factor) : 1;
     const Box part{o.roi->lo / factor, (o.roi->hi + (factor - 1)) / factor};
     VOX_TRY(source, crop(std::move(source), part, run.ctx));
   }
@@ -80,7 +82,7 @@ int main(int argc, char** argv) {
   return run_tool(
       argc, argv, "vox-decode", "Decompresses volumes.",
       "  vox-decode head.svmm -o head.nrrd\n"
-      "  vox-decode head.svmm -o part.nii.gz --roi 0,0,0,64,64,64\n"
+      "  vox-decode head.vqv -o part.nii.gz --roi 0,0,0,64,64,64\n"
       "  vox-decode head.svmm -o small.nrrd --level 2\n"
       "  vox-decode head.svmm -o slice-%04d.png --type u8\n",
       [&](CommandLine& line) { declare(line, options); }, [&](Run& run) { return work(options, run); });

@@ -9,6 +9,7 @@
 #include "tools/common/json.h"
 #include "tools/common/main.h"
 #include "tools/common/svmm_report.h"
+#include "tools/common/vq_report.h"
 
 namespace voxkit::cli {
 namespace {
@@ -28,6 +29,7 @@ void declare(CommandLine& line, Options& o) {
 
 std::string_view format_of(const std::string& file, const Input& input) {
   if (input.svmm) return "svmm";
+  if (input.vq) return "vqv";
   if (is_builtin(file)) return "builtin";
   static constexpr std::pair<std::string_view, std::string_view> endings[] = {
       {".nhdr", "nrrd"}, {".nii", "nifti"}, {".nii.gz", "nifti"}, {".raw", "raw"}, {".vdb", "vdb"},
@@ -48,11 +50,16 @@ std::string letters(uint32_t kind) {
   return text;
 }
 
+/// The container of a compressed volume; null for others.
+const Container* container_of(const Input& input) {
+  return input.svmm ? &input.svmm->container() : input.vq ? &input.vq->container() : nullptr;
+}
+
 Json json_of(const Options& o, const Run& run, const Input& input, std::optional<uint64_t> bytes) {
   const VolumeInfo& info = input.source->info();
   Json json = Json::result();
   json.set("tool", run.tool).set("version", version_text()).set("input", o.file);
-  json.set("format", format_of(o.file, input)).set("codec", input.svmm ? "svmm" : "none");
+  json.set("format", format_of(o.file, input)).set("codec", input.svmm ? "svmm" : input.vq ? "vq" : "none");
   json.set("dims", info.dims).set("voxel_format", voxkit::name(info.format));
   if (!is_colour(info.format)) json.set("sample_type", name(info.sample_type));
   json.set("raw_bytes", raw_bytes(info));
@@ -69,10 +76,12 @@ Json json_of(const Options& o, const Run& run, const Input& input, std::optional
   }
   json.set("spacing", std::move(spacing)).set("origin", std::move(origin));
   json.set("slope", info.slope).set("intercept", info.intercept);
-  json.set("params", input.svmm ? params_json(input.svmm->params()) : Json::object());
+  json.set("params", input.svmm ? params_json(input.svmm->params())
+                     : input.vq ? params_json(input.vq->params())
+                                : Json::object());
   Json chunks = Json::array();
-  if (input.svmm) {
-    for (const ChunkEntry& entry : input.svmm->container().table()) {
+  if (const Container* container = container_of(input)) {
+    for (const ChunkEntry& entry : container->table()) {
       Json chunk = Json::object();
       chunk.set("kind", letters(entry.kind)).set("index", entry.index).set("part", entry.part);
       chunk.set("offset", entry.offset).set("length", entry.length);
@@ -84,6 +93,7 @@ Json json_of(const Options& o, const Run& run, const Input& input, std::optional
   if (input.svmm) {
     json.set("levels", levels_json(input.svmm->levels()));
   }
+  if (input.vq) add_sizes(input.vq->params(), json);
   if (o.check) json.set("checked", true);
   return json;
 }
@@ -115,6 +125,7 @@ std::string text_of(const Options& o, const Input& input, std::optional<uint64_t
                           l.mip_factor, fmt::format("{} x {} x {}", l.dims.x, l.dims.y, l.dims.z), l.blocks,
                           l.block_bytes, l.terminal_voxels);
   }
+  if (input.vq) text += sizes_text(*input.vq);
   if (o.check) text += "check       passed\n";
   return text;
 }
@@ -132,6 +143,7 @@ Result<int> work(const Options& o, Run& run) {
     run.stage("check");
     NullSink sink;
     const Status status = input.svmm ? input.svmm->check(run.ctx)
+                          : input.vq ? input.vq->check(run.ctx)
                                      : copy_volume(*input.source, input.source->info().box(), sink, run.ctx);
     if (!status && status.error().code == ErrorCode::input) {
       // The answer of the check is no: not a failure to give one.
@@ -140,7 +152,8 @@ Result<int> work(const Options& o, Run& run) {
     }
     VOX_CHECK(status);
   }
-  const auto bytes = input.svmm ? std::optional(input.svmm->container().file_bytes()) : file_bytes(o.file);
+  const Container* container = container_of(input);
+  const auto bytes = container ? std::optional(container->file_bytes()) : file_bytes(o.file);
   if (run.options.json) {
     VOX_CHECK(print(json_of(o, run, input, bytes).text()));
   } else if (!run.options.quiet) {
@@ -159,6 +172,6 @@ int main(int argc, char** argv) {
       argc, argv, "vox-info", "Shows what is in a volume file.",
       "  vox-info head.nii.gz\n"
       "  vox-info head.svmm --json\n"
-      "  vox-info head.svmm --check\n",
+      "  vox-info head.vqv --check\n",
       [&](CommandLine& line) { declare(line, options); }, [&](Run& run) { return work(options, run); });
 }

@@ -80,7 +80,11 @@ Result<int> work(const Options& o, Run& run) {
   // open.
   VOX_TRY(auto source, inputs.open(true));
   const VolumeInfo info = source->info();
-  VOX_CHECK(vq::validate(options, info));
+  if (const Status valid = vq::validate(options, info); !valid) {
+    Error error = valid.error();
+    if (error.code == ErrorCode::input) error.file = o.input;
+    return tl::unexpected<Error>(error);
+  }
   if (info.format == VoxelFormat::float32) {
     run.stage("measure");
     VOX_TRY(options.range, measure_range(*source, run.ctx));
@@ -90,8 +94,9 @@ Result<int> work(const Options& o, Run& run) {
   }
   VOX_TRY(const double bound, vq::error_bound(options, info));
   if (o.lossless && bound > 0)
-    return bad_usage(fmt::format(
-        "--lossless: 16 bits do not hold these {} voxels: expected none, or --max-error", name(info.format)));
+    return bad_usage(
+        fmt::format("--lossless: {} voxels are quantised to 65536 levels: leave it out, or use --max-error",
+                    name(info.format)));
 
   VOX_TRY(auto out, OutputFile::create(o.output, run.options.force));
   run.stage("encode");

@@ -1,5 +1,7 @@
 #include "tools/common/vq_report.h"
 
+#include <fmt/format.h>
+
 namespace voxkit::cli {
 
 std::string_view name(vq::Codebook codebook) {
@@ -20,6 +22,23 @@ void add_sizes(const vq::Params& params, Json& json) {
   json.set("unique_bricks", params.unique_bricks).set("codewords", params.codewords);
   json.set("mapping", name(params.mapping)).set("offset_bits", params.offset_bits);
   json.set("offset_bytes", params.offset_bytes).set("codebook_bytes", params.codebook_bytes);
+}
+
+std::string sizes_text(const vq::Volume& volume) {
+  const vq::Params& p = volume.params();
+  const Index3 bricks = volume.bricks();
+  std::string text =
+      fmt::format("codes       {} bits, value {:.10g} * code + {:.10g}, {}\n", p.bits, p.step, p.base,
+                  p.max_error < 0    ? "no bound"
+                  : p.max_error == 0 ? "lossless"
+                                     : fmt::format("within {:.6g}", p.max_error));
+  text +=
+      fmt::format("bricks      {} x {} x {}, {} different\n", bricks.x, bricks.y, bricks.z, p.unique_bricks);
+  text += fmt::format("offsets     {}, up to {} bits each, {} bytes\n", name(p.mapping), p.offset_bits,
+                      p.offset_bytes);
+  text +=
+      fmt::format("codebook    {}, {} bricks, {} bytes\n", name(p.codebook), p.codewords, p.codebook_bytes);
+  return text;
 }
 
 }  // namespace voxkit::cli
