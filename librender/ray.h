@@ -81,6 +81,7 @@ struct Mirrored {
   bool axis[3];
   VOX_HD_HOT explicit Mirrored(const double (&direction)[3])
       : axis{direction[0] < 0, direction[1] < 0, direction[2] < 0} {}
+  VOX_HD_HOT bool operator==(const Mirrored&) const = default;
 };
 
 /// A ray before it enters the grid, as far as that is arithmetic without decisions: for many rays side by

@@ -15,6 +15,7 @@ namespace voxkit::render {
 namespace {
 
 constexpr int tile_width = 128, tile_height = 32;  // pixels of a task
+constexpr int square = 16;                         // pixels that are drawn by packets or one by one
 
 struct Counts {
   uint64_t hit = 0, cells = 0, blocks = 0, bytes = 0;
@@ -25,9 +26,10 @@ struct Rect {
 
 /// A block of pixels, of which (x, y) is the first, each given to `keep`.
 template <int width, int height, class Keep>
-[[gnu::always_inline]] inline void cast_packet(const CastParams& params, BoxedSvmmView::Cursor& cursor,
-                                               VoidTrail& trail, int x, int y, const Keep& keep) {
-  RayPacket<width, height> rays(params, x, y);
+[[gnu::always_inline]] inline void cast_packet(const CastParams& params, const Mirror& mirror,
+                                               BoxedSvmmView::Cursor& cursor, VoidTrail& trail, int x, int y,
+                                               const Keep& keep) {
+  RayPacket<width, height> rays(params, mirror, x, y);
   trail.follow(rays);
   for (int i = 0; i < width * height; ++i) {
     const int pixel_x = x + i % width, pixel_y = y + i / width;
@@ -39,20 +41,23 @@ template <int width, int height, class Keep>
       continue;
     }
     const BoxedCell* cell = nullptr;
+    uint32_t voxel[3] = {};
     while (rays.moving(i)) {
-      cell = &cursor.locate(rays.voxel(i, 0), rays.voxel(i, 1), rays.voxel(i, 2), -1);
+      for (int a = 0; a < 3; ++a) voxel[a] = mirror.voxel(a, rays.voxel(i, a));
+      cell = &cursor.locate(voxel[0], voxel[1], voxel[2], -1);
       if (!cell->is_void) break;
-      trail.add(cell->box);
-      rays.leave(cell->box.lo, cell->box.hi);
+      const Mirror::Box box = mirror(cell->box.lo, cell->box.hi);
+      trail.add(box);
+      rays.leave(box);
     }
     detail.cells = rays.passed(i);
     if (!rays.gone(i)) {
-      const uint32_t voxel[3] = {rays.voxel(i, 0), rays.voxel(i, 1), rays.voxel(i, 2)};
       if (rays.moving(i) && cell->colour.alpha >= 1) {
         ++detail.cells;
         found(voxel, rays.t(i) * world_length(params, pixel_x, pixel_y), pixel, detail);
         blend(cell->colour, 0, pixel);
       } else {  // through what is translucent, or where doubles do not suffice
+        for (int a = 0; a < 3; ++a) voxel[a] = mirror.voxel(a, rays.voxel(i, a));
         GridRay ray(params.start, ray_through(params, pixel_x, pixel_y).direction);
         ray.resume(rays.t(i), voxel);
         follow(params, ray, cursor, pixel_x, pixel_y, pixel, detail);
@@ -97,12 +102,24 @@ template <int packet_height, class View>
   blank(right, tile.x1, top, bottom);
   blank(tile.x0, tile.x1, bottom, tile.y1);
   if constexpr (std::is_same_v<View, BoxedSvmmView>) {
-    VoidTrail trail;
-    const int x_end = right - (right - left) % 2, y_end = bottom - (bottom - top) % packet_height;
-    for (int y = top; y < y_end; y += packet_height)
-      for (int x = left; x < x_end; x += 2) cast_packet<2, packet_height>(params, cursor, trail, x, y, keep);
-    cast_one_by_one(x_end, right, top, y_end);
-    cast_one_by_one(left, right, y_end, bottom);
+    for (int y = top; y < bottom; y += square)
+      for (int x = left; x < right; x += square) {
+        const int x_end = std::min(x + square, right), y_end = std::min(y + square, bottom);
+        const Mirrored first(ray_through(params, x, y).direction);
+        bool alike = (x_end - x) % 2 == 0 && (y_end - y) % packet_height == 0;
+        for (const int at_y : {y, y_end - 1})
+          for (const int at_x : {x, x_end - 1})
+            alike &= first == Mirrored(ray_through(params, at_x, at_y).direction);
+        if (!alike) {
+          cast_one_by_one(x, x_end, y, y_end);
+          continue;
+        }
+        const Mirror mirror(params, first);
+        VoidTrail trail;
+        for (int packet_y = y; packet_y < y_end; packet_y += packet_height)
+          for (int packet_x = x; packet_x < x_end; packet_x += 2)
+            cast_packet<2, packet_height>(params, mirror, cursor, trail, packet_x, packet_y, keep);
+      }
   } else {
     cast_one_by_one(left, right, top, bottom);
   }

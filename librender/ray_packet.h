@@ -13,7 +13,36 @@ struct VectorOf {
   typedef double Real __attribute__((vector_size(lanes * 8)));
 };
 
-/// The rays through a block of pixels, of which (x, y) is the first, row by row.
+/// How the rays through a number of pixels are mirrored, and what they meet.
+class Mirror {
+ public:
+  Mirror(const CastParams& params, const Mirrored& mirrored)
+      : mirrored_(mirrored), side_(static_cast<double>(params.start.mask) + 1) {}
+  const Mirrored& mirrored() const { return mirrored_; }
+
+  /// A box as the rays see it: begin <= v < end.
+  struct Box {
+    double begin[3], end[3];
+  };
+  [[gnu::always_inline]] Box operator()(const uint32_t (&lo)[3], const uint32_t (&hi)[3]) const {
+    Box box;
+    for (int a = 0; a < 3; ++a) {
+      box.begin[a] = mirrored_.axis[a] ? side_ - hi[a] : lo[a];
+      box.end[a] = mirrored_.axis[a] ? side_ - lo[a] : hi[a];
+    }
+    return box;
+  }
+  /// A voxel that they see, as it is.
+  [[gnu::always_inline]] uint32_t voxel(int a, double v) const {
+    return static_cast<uint32_t>(static_cast<int64_t>(mirrored_.axis[a] ? side_ - 1 - v : v));
+  }
+
+ private:
+  Mirrored mirrored_;
+  double side_;  ///< of the grid, about the middle of which rays are mirrored
+};
+
+/// The rays through a block of pixels, of which (x, y) is the first, row by row. All are mirrored alike.
 template <int width, int height>
 class RayPacket {
   static constexpr int lanes = width * height;
@@ -22,18 +51,21 @@ class RayPacket {
   using Lanes = Mask<Real>;
 
  public:
-  [[gnu::always_inline]] RayPacket(const CastParams& params, int x, int y)
-      : RayPacket(params, Mirrored(ray_through(params, x, y).direction), x, y) {}
+  [[gnu::always_inline]] RayPacket(const CastParams& params, const Mirror& mirror, int x, int y)
+      : rays_(params.start, approach(params, mirror.mirrored(), x, y), mirror.mirrored()) {
+    gone_ = ~rays_.may_enter();
+    const Lanes unclear = rays_.enter();
+    entered_ = gone_ | ~unclear;
+    moving_ = entered_ & ~gone_;
+  }
 
-  /// Moves those rays that are in the box lo <= v < hi out of it. False if none is there.
-  [[gnu::always_inline]] bool leave(const uint32_t (&lo)[3], const uint32_t (&hi)[3]) {
+  /// Moves those rays that are in a box out of it. False if none is there.
+  [[gnu::always_inline]] bool leave(const Mirror::Box& box) {
     Lanes inside = moving_;
     Real plane[3], next[3], when;
     for (int a = 0; a < 3; ++a) {
-      const double begin = mirrored_.axis[a] ? side_ - hi[a] : lo[a],
-                   beyond = mirrored_.axis[a] ? side_ - lo[a] : hi[a];
-      inside &= (rays_.voxel[a] >= begin) & (rays_.voxel[a] < beyond);
-      plane[a] = Real{} + beyond;
+      inside &= (rays_.voxel[a] >= box.begin[a]) & (rays_.voxel[a] < box.end[a]);
+      plane[a] = Real{} + box.end[a];
     }
     if (!any(inside)) return false;
     const Lanes unclear = rays_.cross(plane, true, next, when);
@@ -53,33 +85,15 @@ class RayPacket {
 
   /// Whether it is known where a ray enters the grid, if it does.
   [[gnu::always_inline]] bool entered(int lane) const { return entered_[lane] != 0; }
-  /// Then: whether it has missed the grid, or left it; how many boxes it has passed; the voxel in which it is
-  /// now, unless it is gone; when it entered that.
+  /// Then: whether it has missed the grid, or left it; how many boxes it has passed; the (mirrored) voxel in
+  /// which it is now, unless it is gone; when it entered that.
   [[gnu::always_inline]] bool moving(int lane) const { return moving_[lane] != 0; }
   [[gnu::always_inline]] bool gone(int lane) const { return gone_[lane] != 0; }
   [[gnu::always_inline]] uint32_t passed(int lane) const { return static_cast<uint32_t>(passed_[lane]); }
-  [[gnu::always_inline]] uint32_t voxel(int lane, int a) const {
-    const double v = rays_.voxel[a][lane];
-    return static_cast<uint32_t>(static_cast<int64_t>(mirrored_.axis[a] ? side_ - 1 - v : v));
-  }
+  [[gnu::always_inline]] double voxel(int lane, int a) const { return rays_.voxel[a][lane]; }
   [[gnu::always_inline]] double t(int lane) const { return rays_.t[lane]; }
 
  private:
-  [[gnu::always_inline]] RayPacket(const CastParams& params, const Mirrored& mirrored, int x, int y)
-      : rays_(params.start, approach(params, mirrored, x, y), mirrored),
-        mirrored_(mirrored),
-        side_(static_cast<double>(params.start.mask) + 1) {
-    bool alike = true;  // so are those between
-    for (int corner = 1; corner < 4; ++corner) {
-      const Mirrored other(
-          ray_through(params, corner % 2 ? x + width - 1 : x, corner / 2 ? y + height - 1 : y).direction);
-      for (int a = 0; a < 3; ++a) alike &= mirrored.axis[a] == other.axis[a];
-    }
-    gone_ = ~rays_.may_enter();
-    const Lanes unclear = rays_.enter();
-    entered_ = alike ? gone_ | ~unclear : Lanes{};
-    moving_ = entered_ & ~gone_;
-  }
   [[gnu::always_inline]] static Approach<Real> approach(const CastParams& params, const Mirrored& mirrored,
                                                         int x, int y) {
     Real u, v;
@@ -95,8 +109,6 @@ class RayPacket {
   }
 
   Motion rays_;
-  Mirrored mirrored_;
-  double side_;     ///< of the grid, about the middle of which rays are mirrored
   Lanes entered_;   ///< or missed, by what is clear
   Lanes gone_;      ///< missed or left
   Lanes moving_;    ///< in the grid, by what is clear

@@ -181,6 +181,7 @@ struct BoxedSvmmView {
 };
 
 /// The void boxes that a packet of rays came through, which are most likely those of the packet beside it.
+/// All of these rays are mirrored alike.
 class VoidTrail {
  public:
   /// Moves rays through them, and forgets those in which no ray was.
@@ -188,16 +189,16 @@ class VoidTrail {
   [[gnu::always_inline]] void follow(Rays& rays) {
     int kept = 0;
     for (int i = 0; i < count_; ++i)
-      if (rays.leave(boxes_[i].lo, boxes_[i].hi)) boxes_[kept++] = boxes_[i];
+      if (rays.leave(boxes_[i])) boxes_[kept++] = boxes_[i];
     count_ = kept;
   }
-  [[gnu::always_inline]] void add(const VoidBox& box) {
+  [[gnu::always_inline]] void add(const Mirror::Box& box) {
     if (count_ < most) boxes_[count_++] = box;
   }
 
  private:
   static constexpr int most = 32;
-  VoidBox boxes_[most];
+  Mirror::Box boxes_[most];
   int count_ = 0;
 };
 
