@@ -106,7 +106,7 @@ template <int packet_height, class View>
       for (int x = left; x < right; x += square) {
         const int x_end = std::min(x + square, right), y_end = std::min(y + square, bottom);
         const Mirrored first(ray_through(params, x, y).direction);
-        bool alike = (x_end - x) % 2 == 0 && (y_end - y) % packet_height == 0;
+        bool alike = true;
         for (const int at_y : {y, y_end - 1})
           for (const int at_x : {x, x_end - 1})
             alike &= first == Mirrored(ray_through(params, at_x, at_y).direction);
@@ -116,9 +116,12 @@ template <int packet_height, class View>
         }
         const Mirror mirror(params, first);
         VoidTrail trail;
-        for (int packet_y = y; packet_y < y_end; packet_y += packet_height)
-          for (int packet_x = x; packet_x < x_end; packet_x += 2)
+        const int whole_x = x_end - (x_end - x) % 2, whole_y = y_end - (y_end - y) % packet_height;
+        for (int packet_y = y; packet_y < whole_y; packet_y += packet_height)
+          for (int packet_x = x; packet_x < whole_x; packet_x += 2)
             cast_packet<2, packet_height>(params, mirror, cursor, trail, packet_x, packet_y, keep);
+        cast_one_by_one(whole_x, x_end, y, whole_y);
+        cast_one_by_one(x, x_end, whole_y, y_end);
       }
   } else {
     cast_one_by_one(left, right, top, bottom);

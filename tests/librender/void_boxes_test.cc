@@ -74,6 +74,18 @@ TEST_P(VoidBoxTest, AskingAllVoxelsIsLookingAtEach) {
     svmm::EveryVoxel every(volume_->store().view, pools, is, 1 << 20);
     const bool expected = is_void_in(box);
     ASSERT_EQ(every(box.lo, box.hi), expected);
+    ASSERT_EQ(every.found(), !expected);
+    if (!expected) {  // and where it is not: all that lies there and in the box
+      VoidBox where = box;
+      for (int a = 0; a < 3; ++a) {
+        where.lo[a] = static_cast<uint32_t>(std::max<uint64_t>(box.lo[a], every.begin(a)));
+        where.hi[a] = static_cast<uint32_t>(std::min<uint64_t>(box.hi[a], every.end(a)));
+        ASSERT_LT(where.lo[a], where.hi[a]);
+      }
+      for (uint32_t z = where.lo[2]; z < where.hi[2]; ++z)
+        for (uint32_t y = where.lo[1]; y < where.hi[1]; ++y)
+          for (uint32_t x = where.lo[0]; x < where.hi[0]; ++x) ASSERT_FALSE(is_void_at(x, y, z));
+    }
     all += expected;
     svmm::EveryVoxel poor(volume_->store().view, pools, is, 1);
     if (poor(box.lo, box.hi)) {
