@@ -107,7 +107,7 @@ class SvmmGrid {
   const VolumeInfo& info() const { return volume_->info(); }
   const svmm::Volume& volume() const { return *volume_; }
   /// What was learned of the volume's void from earlier pictures that showed the same range of values.
-  std::shared_ptr<VoidMemo> void_memo(const ValueRange& range) const;
+  Result<std::shared_ptr<VoidMemo>> void_memo(const ValueRange& range, Context& ctx) const;
 
  private:
   std::shared_ptr<const svmm::Volume> volume_;

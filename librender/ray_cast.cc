@@ -199,10 +199,13 @@ struct SvmmGrid::Learned {
 SvmmGrid::SvmmGrid(std::shared_ptr<const svmm::Volume> volume)
     : volume_(std::move(volume)), learned_(std::make_shared<Learned>()) {}
 
-std::shared_ptr<VoidMemo> SvmmGrid::void_memo(const ValueRange& range) const {
+Result<std::shared_ptr<VoidMemo>> SvmmGrid::void_memo(const ValueRange& range, Context& ctx) const {
   const std::lock_guard lock(learned_->mutex);
   std::shared_ptr<VoidMemo>& memo = learned_->void_memo;
-  if (!memo || !(memo->range() == range)) memo = std::make_shared<VoidMemo>(range);
+  if (!memo || !(memo->range() == range)) {
+    memo.reset();
+    VOX_TRY(memo, VoidMemo::create(range, ctx));
+  }
   return memo;
 }
 
@@ -229,7 +232,7 @@ Status cast(const SvmmGrid& grid, const Camera& camera, const CastOptions& optio
     const SvmmView<MappedPools, Search::path> path{view, &pools};
     VOX_CHECK(cast_with(path, params, options, frame, ctx));
   } else {
-    const auto memo = grid.void_memo(options.range);
+    VOX_TRY(const std::shared_ptr<VoidMemo> memo, grid.void_memo(options.range, ctx));
     const BoxedSvmmView boxed{view, &pools, &params, memo.get(), least_log2(info, camera, options)};
     VOX_CHECK(cast_with(boxed, params, options, frame, ctx));
   }

@@ -19,8 +19,11 @@ struct VoidBox {
 /// depends on nothing else, so what is remembered from other rays and other pictures changes no result.
 class VoidMemo {
  public:
-  /// What is void depends on `range`.
-  explicit VoidMemo(const ValueRange& range) : range_(range), slots_(std::make_unique<Slot[]>(size)) {}
+  /// What is void depends on `range`. 6 MB, which count against ctx.memory as long as it lives.
+  static Result<std::shared_ptr<VoidMemo>> create(const ValueRange& range, Context& ctx) {
+    VOX_TRY(std::unique_ptr<Buffer> buffer, Buffer::allocate(size * sizeof(Slot), "a memo of void", ctx));
+    return std::shared_ptr<VoidMemo>(new VoidMemo(range, std::move(buffer)));
+  }
   const ValueRange& range() const { return range_; }
 
   /// A cell: its lo corner and log2 of its edge.
@@ -73,8 +76,13 @@ class VoidMemo {
         key.corner[2] * uint64_t{0x165667b19e3779f9} ^ static_cast<uint64_t>(key.log2_edge) << 59;
     return (mixed * uint64_t{0x9e3779b97f4a7c15}) >> (64 - log2_size);
   }
+  VoidMemo(const ValueRange& range, std::unique_ptr<Buffer> buffer)
+      : range_(range), buffer_(std::move(buffer)), slots_(reinterpret_cast<Slot*>(buffer_->data())) {
+    std::uninitialized_value_construct_n(slots_, size);
+  }
   ValueRange range_;
-  std::unique_ptr<Slot[]> slots_;
+  std::unique_ptr<Buffer> buffer_;
+  Slot* slots_;
 };
 
 /// Grows a void box as far as it remains void, to each side in turn by as much as it is wide there.
