@@ -1,4 +1,4 @@
-// Rays through neighbouring pixels of a row, side by side in vector registers, as far as they cross the same
+// Rays through neighbouring pixels, side by side in vector registers, as far as they cross the same
 // boxes: one box costs all of them hardly more than one. What doubles do not settle is left to each ray
 // alone, so that every ray meets the voxels, and the times, that it meets alone.
 #pragma once

@@ -63,7 +63,7 @@ CommandLine::CommandLine(const std::string& tool, const std::string& purpose, co
   app.footer(
       "Examples:\n" + examples +
       "\nExit codes: 0 done; 1 the check answered no; 2 usage; 3 input unreadable; 4 output cannot be\n"
-      "written, or exists; 5 a limit was reached; 70 a bug of ours.");
+      "written, or exists; 5 a limit was reached; 6 the device asked for is not there; 70 a bug of ours.");
 }
 
 CommandLine::~CommandLine() = default;
