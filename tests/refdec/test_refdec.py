@@ -9,27 +9,15 @@ import json
 import os
 import random
 import struct
-import subprocess
 import sys
-import tempfile
 import unittest
 
-HERE = os.path.dirname(os.path.abspath(__file__))
-DECODER = os.path.join(HERE, "svmm_decode.py")
-BIN = os.environ.get("VOXKIT_BIN")
 sys.dont_write_bytecode = True
-sys.path.insert(0, HERE)
-from svmm_decode import Container, Refused, Svmm, decode, xxh64  # noqa: E402
+from container import Container, Refused, xxh64  # noqa: E402
+from helpers import BIN, HERE, ToolCase, container, raw_file, read, write  # noqa: E402
+from svmm_decode import Svmm, decode  # noqa: E402
 
-
-def read(path):
-    with open(path, "rb") as file:
-        return file.read()
-
-
-def write(path, data):
-    with open(path, "wb") as file:
-        file.write(data)
+DECODER = os.path.join(HERE, "svmm_decode.py")
 
 
 # ---- Without tools ---------------------------------------------------------------------------------------------------
@@ -40,27 +28,6 @@ class Checksum(unittest.TestCase):
         for text, value in ((b"", 0xEF46DB3751D8E999), (b"a", 0xD24EC4F1A98C6E5B), (b"abc", 0x44BC2CF5AD770999),
                             (b"Nobody inspects the spammish repetition", 0xFBCEA83C8A378BF1)):
             self.assertEqual(xxh64(text), value)
-
-
-def raw_file(voxels, sample):
-    """What a .raw file has for the voxels: signed samples without their bias, bits eight to a byte."""
-    if sample in ("i8", "i16"):
-        size = int(sample[1:]) // 8
-        return bytes(byte ^ 128 if at % size == size - 1 else byte for at, byte in enumerate(voxels))
-    if sample == "bit":
-        return bytes(sum(bit << i for i, bit in enumerate(voxels[at:at + 8])) for at in range(0, len(voxels), 8))
-    return voxels
-
-
-def container(chunks, version=1, codec=1):
-    """A file of (kind, index, part, data) with all checksums right."""
-    header = b"\x89VOX\r\n\x1a\n" + struct.pack("<HH44x", version, codec)
-    out, table = header + struct.pack("<Q", xxh64(header)), b""
-    for kind, index, part, data in chunks:
-        table += struct.pack("<4sIQQQQ24x", kind, index, part, len(out), len(data), xxh64(data))
-        out += data + bytes(-len(data) % 64)
-    trailer = b"VOXTABLE" + struct.pack("<4Q16x", len(out), len(chunks), len(out) + len(table) + 64, xxh64(table))
-    return out + table + trailer + struct.pack("<Q", xxh64(trailer))
 
 
 class SmallFile(unittest.TestCase):
@@ -186,36 +153,17 @@ SAMPLE_TYPES = (  # of a .raw file; voxel format, bits of a voxel, bases, layout
 
 
 @unittest.skipUnless(BIN, "VOXKIT_BIN is not set")
-class Tools(unittest.TestCase):
-    def setUp(self):
-        folder = tempfile.TemporaryDirectory()
-        self.addCleanup(folder.cleanup)
-        self.path = lambda name: os.path.join(folder.name, name)
-
-    def run_program(self, *command, expect=0):
-        done = subprocess.run([str(word) for word in command], stdout=subprocess.PIPE, stderr=subprocess.PIPE,
-                              universal_newlines=True)
-        self.assertEqual(done.returncode, expect, "{}: {}".format(" ".join(map(str, command)), done.stderr))
-        return done
-
+class Tools(ToolCase):
     def encode(self, source, *options):
         self.run_program(os.path.join(BIN, "svmm-encode"), source, "-f", "-o", self.path("x.svmm"), *options)
         return self.path("x.svmm")
-
-    def decode_both(self, file, out, *options, expect=0):
-        """Has both programs decode the file; returns what the tool and what the reference decoder wrote."""
-        tool, reference = self.path("tool-" + out), self.path("reference-" + out)
-        self.run_program(os.path.join(BIN, "vox-decode"), file, "-f", "-o", tool, *options, expect=expect)
-        done = self.run_program(sys.executable, DECODER, file, reference, *options, expect=expect)
-        self.assertEqual(len(done.stderr.splitlines()), 1 if expect else 0, done.stderr)
-        return [read(path) if os.path.exists(path) else None for path in (tool, reference)]
 
     def compare(self, file):
         """Levels 0, 1 and the root, decoded by both."""
         info = json.loads(self.run_program(sys.executable, DECODER, "--info", file).stdout)
         for level in sorted({0, min(1, len(info["levels"]) - 1), len(info["levels"]) - 1}):
             with self.subTest(level=level):
-                tool, reference = self.decode_both(file, "good.raw", "--level", level)
+                tool, reference = self.decode_both(DECODER, file, "good.raw", "--level", level)
                 reference = raw_file(reference, info["sample_type"])
                 self.assertEqual(len(tool), len(reference))
                 different = [at for at in range(len(tool)) if tool[at] != reference[at]]
@@ -254,7 +202,7 @@ class Tools(unittest.TestCase):
         for number, content in enumerate(damaged):
             with self.subTest(number=number):
                 write(self.path("bad.svmm"), content)
-                self.assertEqual(self.decode_both(self.path("bad.svmm"), "bad.raw", expect=3), [None, None])
+                self.assertEqual(self.decode_both(DECODER, self.path("bad.svmm"), "bad.raw", expect=3), [None, None])
 
 
 if __name__ == "__main__":

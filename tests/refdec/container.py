@@ -1,0 +1,140 @@
+"""What all voxkit files have in common, from section 1 of formats/FORMAT.md alone: the container and the volume.
+
+For the reference decoders beside this file. Section numbers are those of FORMAT.md.
+"""
+
+import math
+import struct
+from collections import namedtuple
+
+
+class Refused(Exception):
+    """The file is not one that a reader may accept."""
+
+
+def require(condition, message, *values):
+    if not condition:
+        raise Refused(message.format(*values))
+
+
+# ---- XXH64, seed 0 ---------------------------------------------------------------------------------------------------
+
+M64 = (1 << 64) - 1
+P1, P2, P3, P4, P5 = (0x9E3779B185EBCA87, 0xC2B2AE3D27D4EB4F, 0x165667B19E3779F9, 0x85EBCA77C2B2AE63,
+                      0x27D4EB2F165667C5)
+
+
+def rotate(x, bits):
+    return (x << bits | x >> (64 - bits)) & M64
+
+
+def mix(accumulator, lane):
+    return rotate((accumulator + lane * P2) & M64, 31) * P1 & M64
+
+
+def xxh64(data):
+    data, length = memoryview(data), len(data)
+    full = length & ~31
+    h = P5
+    if full:
+        a, b, c, d = (P1 + P2) & M64, P2, 0, -P1 & M64
+        for i, j, k, l in struct.iter_unpack("<4Q", data[:full]):
+            a, b, c, d = mix(a, i), mix(b, j), mix(c, k), mix(d, l)
+        h = rotate(a, 1) + rotate(b, 7) + rotate(c, 12) + rotate(d, 18)
+        for lane in (a, b, c, d):
+            h = ((h ^ mix(0, lane)) * P1 + P4) & M64
+    h = (h + length) & M64
+    words = full + (length - full) // 8 * 8
+    for (lane,) in struct.iter_unpack("<Q", data[full:words]):
+        h = (rotate(h ^ mix(0, lane), 27) * P1 + P4) & M64
+    if length - words >= 4:
+        h = (rotate(h ^ struct.unpack_from("<I", data, words)[0] * P1 & M64, 23) * P2 + P3) & M64
+        words += 4
+    for byte in data[words:]:
+        h = rotate(h ^ byte * P5 & M64, 11) * P1 & M64
+    h = (h ^ h >> 33) * P2 & M64
+    h = (h ^ h >> 29) * P3 & M64
+    return h ^ h >> 32
+
+
+# ---- Section 1: the container ----------------------------------------------------------------------------------------
+
+Chunk = namedtuple("Chunk", "kind index part offset length checksum")
+KINDS = (b"VOLI", b"SVMP", b"BLKS", b"VQPM", b"OFFS", b"ADDR", b"CODE")  # any other kind is ignored
+
+
+class Container:
+    """Checks all that is common to all codecs; `chunks` maps (kind, index, part) to the chunk."""
+
+    def __init__(self, data):
+        self.data = memoryview(data)
+        size = len(data)
+        require(size >= 8 and data[:8] == b"\x89VOX\r\n\x1a\n", "header: byte 0: not a voxkit file")
+        require(size >= 128, "file: {} bytes, shorter than a header and a trailer", size)
+        self.check("header", 0, 56, self.unpack("<Q", 56)[0])
+        self.version, self.codec = self.unpack("<HH", 8)
+        require(self.version == 1, "header: byte 8: container version {}, expected 1", self.version)
+
+        end = size - 64
+        require(data[end:end + 8] == b"VOXTABLE", "trailer: byte {}: not found, the file is truncated", end)
+        table, entries, length, table_sum = self.unpack("<4Q", end + 8)
+        self.check("trailer", end, 56, self.unpack("<Q", end + 56)[0])
+        require(length == size, "trailer: byte {}: file length {}, found {}", end + 24, length, size)
+        require(table % 64 == 0 and 64 <= table <= end and table + 64 * entries == end,
+                "trailer: byte {}: the chunk table does not end at the trailer", end + 8)
+        self.check("chunk table", table, end - table, table_sum)
+
+        self.chunks, free = {}, 64
+        for at in range(table, end, 64):
+            chunk = Chunk(*self.unpack("<4sIQQQQ", at))
+            require(chunk.offset % 64 == 0, "chunk table: byte {}: offset not a multiple of 64", at + 16)
+            require(free <= chunk.offset and chunk.offset + chunk.length <= table,
+                    "chunk table: byte {}: chunks overlap, are out of order or leave their section", at + 16)
+            free = chunk.offset + chunk.length
+            if chunk.kind in KINDS:
+                require(chunk[:3] not in self.chunks, "chunk table: byte {}: chunk listed twice", at)
+                self.check("chunk " + chunk.kind.decode(), chunk.offset, chunk.length, chunk.checksum)
+                self.chunks[chunk[:3]] = chunk
+
+    def unpack(self, layout, offset):
+        return struct.unpack_from(layout, self.data, offset)
+
+    def check(self, what, offset, length, expected):
+        require(xxh64(self.data[offset:offset + length]) == expected, "{}: byte {}: checksum differs", what, offset)
+
+    def only(self, kind):
+        """The chunk of a kind of which there is exactly one."""
+        found = [key for key in self.chunks if key[0] == kind]
+        require(found == [(kind, 0, 0)], "chunk {}: expected exactly one, index 0, part 0", kind.decode())
+        return self.chunks[found[0]]
+
+
+# ---- Section 1.4: the volume -----------------------------------------------------------------------------------------
+
+FORMATS = {1: ("RGBA32", 4), 2: ("RGB24", 3), 3: ("DENSITY8", 1), 4: ("DENSITY16", 2), 5: ("FLOAT32", 4),
+           6: ("BITMAP", 1)}
+SAMPLES = {1: "u8", 2: "i8", 3: "u16", 4: "i16", 5: "u32", 6: "i32", 7: "u64", 8: "i64", 9: "f32", 10: "f64", 11: "bit"}
+SAMPLES_OF = {"DENSITY8": ("u8", "i8"), "DENSITY16": ("u16", "i16"), "BITMAP": ("bit",),
+              "FLOAT32": ("u32", "i32", "u64", "i64", "f32", "f64")}
+
+
+class Volume:
+    def __init__(self, container):
+        chunk = container.only(b"VOLI")
+        at = chunk.offset
+        require(chunk.length == 112, "chunk VOLI: byte {}: {} bytes, expected 112", at, chunk.length)
+        self.dims = x, y, z = container.unpack("<3Q", at)
+        require(all(1 <= d <= 1 << 31 for d in self.dims) and x * y * z <= 1 << 62,
+                "chunk VOLI: byte {}: dimensions {} out of range", at, self.dims)
+        voxel, sample, self.has_range = container.unpack("<3B", at + 24)
+        require(voxel in FORMATS, "chunk VOLI: byte {}: unknown voxel format {}", at + 24, voxel)
+        self.format, self.voxel_bytes = FORMATS[voxel]
+        self.colour = voxel <= 2
+        self.sample = SAMPLES.get(sample)
+        require(self.sample in SAMPLES_OF.get(self.format, SAMPLES.values()),
+                "chunk VOLI: byte {}: sample type {} does not go with {}", at + 25, sample, self.format)
+        require(self.has_range <= 1, "chunk VOLI: byte {}: {}, expected 0 or 1", at + 26, self.has_range)
+        self.spacing, self.origin = container.unpack("<3d", at + 32), container.unpack("<3d", at + 56)
+        require(all(map(math.isfinite, self.spacing + self.origin)),
+                "chunk VOLI: byte {}: spacing or origin not finite", at + 32)
+        self.slope, self.intercept, *self.range = container.unpack("<4d", at + 80)
