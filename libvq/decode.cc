@@ -2,7 +2,8 @@
 #include <fmt/format.h>
 
 #include <algorithm>
-#include <cmath>
+#include <cstring>
+#include <type_traits>
 
 #include "libvq/store.h"
 
@@ -37,7 +38,7 @@ Voxel Volume::voxel_of(uint16_t code) const {
   return vq::voxel_of(code, info_.format, params_.base, params_.step);
 }
 
-/// A reader whose answers come with reasons.
+/// A reader whose failures have reasons.
 struct Decoder {
   const Volume& volume;
   const MappedPools pools{volume};
@@ -48,49 +49,56 @@ struct Decoder {
     if (const Status status = volume.store().status(); !status) return tl::unexpected<Error>(status.error());
     return bad_input(volume.container().name(), what);
   }
-  Result<uint64_t> id(Index3 brick) const {
-    const uint64_t id = reader.brick_id(static_cast<uint32_t>(brick.x), static_cast<uint32_t>(brick.y),
-                                        static_cast<uint32_t>(brick.z));
-    if (id != Reader<MappedPools>::no_brick) return id;
+  [[gnu::cold]] tl::unexpected<Error> no_place(Index3 brick) const {
     return no_answer(
         fmt::format("chunk OFFS: the block of brick {},{},{}: not valid entries", brick.x, brick.y, brick.z));
   }
-  Result<Record> find(uint64_t id) const {
-    Record record;
-    if (reader.find(id, record)) return record;
+  [[gnu::cold]] tl::unexpected<Error> no_brick(uint64_t id) const {
     return no_answer(fmt::format("chunk CODE: no valid brick {}", id));
   }
-  Status decode(uint64_t id, const Record& record, uint16_t* codes) const {
-    if (reader.decode(record, codes)) return {};
-    return no_answer(fmt::format("chunk CODE: brick {}: not a valid codeword", id));
+
+  uint64_t id_at(Index3 brick) const {
+    return reader.brick_id(static_cast<uint32_t>(brick.x), static_cast<uint32_t>(brick.y),
+                           static_cast<uint32_t>(brick.z));
   }
 };
+constexpr uint64_t no_id = Reader<MappedPools>::no_brick;
 
 Result<uint64_t> Volume::brick_id(Index3 brick) const {
   if (!Box{Index3(0), bricks()}.contains(brick))
     return fail(ErrorCode::internal, container_->name(), "brick outside the volume");
-  return Decoder{*this}.id(brick);
+  const Decoder decoder{*this};
+  const uint64_t id = decoder.id_at(brick);
+  if (id == no_id) return decoder.no_place(brick);
+  return id;
 }
 Result<BrickRange> Volume::brick_range(uint64_t id) const {
-  VOX_TRY(const Record record, Decoder{*this}.find(id));
+  const Decoder decoder{*this};
+  Record record;
+  if (!decoder.reader.find(id, record)) return decoder.no_brick(id);
   return record.range;
 }
 Status Volume::decode_brick(uint64_t id, Brick& codes) const {
   const Decoder decoder{*this};
-  VOX_TRY(const Record record, decoder.find(id));
-  return decoder.decode(id, record, codes.data());
+  Record record;
+  if (!decoder.reader.find(id, record) || !decoder.reader.decode(record, codes.data()))
+    return decoder.no_brick(id);
+  return {};
 }
 
 Result<Voxel> Volume::sample(Index3 voxel) const {
   if (!info_.box().contains(voxel))
     return fail(ErrorCode::internal, container_->name(), "sample outside the volume");
   const Decoder decoder{*this};
-  VOX_TRY(const uint64_t id, decoder.id(voxel / Index3(brick_edge)));
-  VOX_TRY(const Record record, decoder.find(id));
+  const Index3 brick = voxel / Index3(brick_edge);
+  const uint64_t id = decoder.id_at(brick);
+  if (id == no_id) return decoder.no_place(brick);
   const auto within = static_cast<uint32_t>(voxel.x % 4 + 4 * (voxel.y % 4) + 16 * (voxel.z % 4));
-  Brick codes;
-  VOX_CHECK(decoder.decode(id, record, codes.data()));
-  return voxel_of(codes[within]);
+  Record record;
+  uint16_t code = 0;
+  if (!decoder.reader.find(id, record) || !decoder.reader.decode_one(record, within, code))
+    return decoder.no_brick(id);
+  return voxel_of(code);
 }
 
 namespace {
@@ -127,6 +135,23 @@ void to_voxels(const Brick& codes, VoxelFormat format, const Params& params, std
   }
 }
 
+/// Copies the part of a brick, of 4^3 voxels of `bytes` bytes, that begins at `from`.
+void copy_part(const std::byte* brick, Index3 from, Index3 size, int bytes, VoxelSpan out) {
+  const auto row_of = [&](int64_t y, int64_t z) {
+    return brick + (from.x + 4 * (from.y + y) + 16 * (from.z + z)) * bytes;
+  };
+  const auto copy_rows = [&](auto width) {  // a constant, where rows are whole
+    for (int64_t z = 0; z < size.z; ++z)
+      for (int64_t y = 0; y < size.y; ++y)
+        std::memcpy(out.row(y, z), row_of(y, z), static_cast<size_t>(width));
+  };
+  const int64_t width = size.x * bytes;
+  if (width == 4) return copy_rows(std::integral_constant<int, 4>());
+  if (width == 8) return copy_rows(std::integral_constant<int, 8>());
+  if (width == 16) return copy_rows(std::integral_constant<int, 16>());
+  copy_rows(width);
+}
+
 }  // namespace
 
 Result<uint64_t> Volume::decode(const Box& box, VoxelSpan out) const {
@@ -134,36 +159,29 @@ Result<uint64_t> Volume::decode(const Box& box, VoxelSpan out) const {
   if (!info_.box().contains(box))
     return fail(ErrorCode::internal, container_->name(), "box outside the volume");
   const Decoder decoder{*this};
-  const int64_t stride = voxel_bytes(info_.format);
+  const int bytes = voxel_bytes(info_.format);
   const Index3 first = box.lo / Index3(brick_edge), last = (box.hi - Index3(1)) / Index3(brick_edge);
   Brick codes;
   std::array<std::byte, brick_voxels * sizeof(float)> voxels;
-  std::optional<uint64_t> decoded;
-  uint64_t count = 0;
+  uint64_t decoded = no_id, count = 0;
   for (int64_t z = first.z; z <= last.z; ++z)
     for (int64_t y = first.y; y <= last.y; ++y)
       for (int64_t x = first.x; x <= last.x; ++x) {
-        const Index3 corner = Index3(x, y, z) * int64_t{brick_edge};
-        const Box part = intersect({corner, corner + Index3(brick_edge)}, box);
-        VOX_TRY(const uint64_t id, decoder.id({x, y, z}));
+        const uint64_t id = decoder.id_at({x, y, z});
+        if (id == no_id) return decoder.no_place({x, y, z});
         ++count;
-        if (decoded != id) {
-          VOX_TRY(const Record record, decoder.find(id));
-          VOX_CHECK(decoder.decode(id, record, codes.data()));
+        if (id != decoded) {
+          Record record;
+          if (!decoder.reader.find(id, record) || !decoder.reader.decode(record, codes.data()))
+            return decoder.no_brick(id);
           to_voxels(codes, info_.format, params_, voxels.data());
           decoded = id;
         }
-        const Index3 from = part.lo - corner, to = part.lo - box.lo, size = part.size();
-        const ConstVoxelSpan brick =
-            packed(static_cast<const std::byte*>(voxels.data()), Index3(brick_edge), info_.format);
-        if (size.x == brick_edge && stride == 1) {
-          for (int64_t k = 0; k < size.z; ++k)
-            for (int64_t j = 0; j < size.y; ++j)
-              std::memcpy(out.row(to.y + j, to.z + k) + to.x, brick.row(from.y + j, from.z + k), 4);
-        } else {
-          copy({brick.row(from.y, from.z) + from.x * stride, brick.row_stride, brick.slice_stride},
-               {out.row(to.y, to.z) + to.x * stride, out.row_stride, out.slice_stride}, size, info_.format);
-        }
+        const Index3 corner = Index3(x, y, z) * int64_t{brick_edge};
+        const Box part = intersect({corner, corner + Index3(brick_edge)}, box);
+        const Index3 to = part.lo - box.lo;
+        copy_part(voxels.data(), part.lo - corner, part.size(), bytes,
+                  {out.row(to.y, to.z) + to.x * bytes, out.row_stride, out.slice_stride});
       }
   return count;
 }
@@ -172,19 +190,19 @@ std::optional<Voxel> Volume::uniform(const Box& box) const {
   if (box.empty()) return std::nullopt;
   const Decoder decoder{*this};
   const Index3 first = box.lo / Index3(brick_edge), last = (box.hi - Index3(1)) / Index3(brick_edge);
-  std::optional<uint64_t> known;
+  uint64_t known = no_id;
   std::optional<uint16_t> code;
   for (int64_t z = first.z; z <= last.z; ++z)
     for (int64_t y = first.y; y <= last.y; ++y)
       for (int64_t x = first.x; x <= last.x; ++x) {
-        const auto id = decoder.id({x, y, z});
-        if (!id) return std::nullopt;
-        if (known == *id) continue;
-        const auto record = decoder.find(*id);
-        if (!record || record->range.min != record->range.max) return std::nullopt;
-        if (code && *code != record->range.min) return std::nullopt;
-        known = *id;
-        code = record->range.min;
+        const uint64_t id = decoder.id_at({x, y, z});
+        if (id == no_id) return std::nullopt;
+        if (id == known) continue;
+        Record record;
+        if (!decoder.reader.find(id, record) || record.range.min != record.range.max) return std::nullopt;
+        if (code && *code != record.range.min) return std::nullopt;
+        known = id;
+        code = record.range.min;
       }
   return voxel_of(*code);
 }

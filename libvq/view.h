@@ -136,6 +136,24 @@ class Reader {
 #endif
   }
 
+  /// One code of a brick that was found, by its number in raster order; false if it cannot be decoded. Of
+  /// packed bricks only that code is read.
+  VOX_HD_HOT bool decode_one(const Record& record, uint32_t number, uint16_t& code) const {
+    if (record.range.min == record.range.max) {
+      code = record.range.min;
+      return true;
+    }
+    if (view_->codebook == Codebook::packed) {
+      code = static_cast<uint16_t>(
+          load_bits(record.code, uint64_t{number} * static_cast<uint64_t>(view_->bits), view_->bits));
+      return code >= record.range.min && code <= record.range.max;
+    }
+    uint16_t codes[brick_voxels];
+    if (!decode(record, codes)) return false;
+    code = codes[number];
+    return true;
+  }
+
  private:
   /// Of an indirect mapping: where a brick begins and how long it is.
   VOX_HD_HOT bool address_of(uint64_t id, uint64_t& address, uint64_t& length) const {
