@@ -29,10 +29,11 @@ VOX_HD_HOT uint32_t fold_modulo(uint32_t voxel, uint32_t predicted, uint32_t top
   const uint32_t up = voxel >= predicted ? voxel - predicted : top + 1 - (predicted - voxel);  // 0 .. top
   return 2 * up <= top ? 2 * up : 2 * (top + 1 - up) - 1;
 }
-/// The inverse; codes 0 .. top only.
+/// The inverse; codes 0 .. top only. Without branches, which could not be foreseen.
 VOX_HD_HOT uint32_t unfold_modulo(uint32_t code, uint32_t predicted, uint32_t top) {
-  const uint32_t up = code & 1 ? top - (code >> 1) : code >> 1;
-  return up <= top - predicted ? predicted + up : predicted + up - top - 1;
+  const uint32_t odd = 0 - (code & 1);
+  const uint32_t voxel = predicted + ((code >> 1) ^ odd) + (odd & (top + 1));
+  return voxel - ((0 - static_cast<uint32_t>(voxel > top)) & (top + 1));
 }
 
 /// Codes alternate between both sides, 0, -1, 1, -2 ..., until one is used up; what follows counts on along
@@ -43,23 +44,25 @@ VOX_HD_HOT uint32_t fold_bounded(uint32_t voxel, uint32_t predicted, uint32_t to
   if (distance > near) return distance + near;
   return voxel >= predicted ? 2 * distance : 2 * distance - 1;
 }
-/// The inverse; codes 0 .. top only.
+/// The inverse; codes 0 .. top only. Most are on both sides, so only what is not is worth a branch.
 VOX_HD_HOT uint32_t unfold_bounded(uint32_t code, uint32_t predicted, uint32_t top) {
-  const bool low = predicted <= top - predicted;
-  const uint32_t near = low ? predicted : top - predicted;
-  if (code > 2 * near) return low ? code : top - code;
-  return code & 1 ? predicted - (code >> 1) - 1 : predicted + (code >> 1);
+  const uint32_t room = top - predicted, near = predicted <= room ? predicted : room;
+  if (code > 2 * near) return predicted <= room ? code : top - code;
+  return predicted + ((code >> 1) ^ (0 - (code & 1)));
 }
 
+VOX_HD_HOT uint32_t least(uint32_t a, uint32_t b) {
+  return a < b ? a : b;
+}
+VOX_HD_HOT uint32_t greatest(uint32_t a, uint32_t b) {
+  return a < b ? b : a;
+}
 /// a + b - ab, brought into 0 .. top.
 VOX_HD_HOT uint32_t plane(uint32_t a, uint32_t b, uint32_t ab, uint32_t top) {
-  const uint32_t sum = a + b;
-  if (sum <= ab) return 0;
-  return sum - ab < top ? sum - ab : top;
+  return least(greatest(a + b, ab) - ab, top);
 }
 VOX_HD_HOT uint32_t median(uint32_t a, uint32_t b, uint32_t c) {
-  const uint32_t low = a < b ? a : b, high = a < b ? b : a, rest = high < c ? high : c;
-  return low > rest ? low : rest;
+  return greatest(least(a, b), least(greatest(a, b), c));
 }
 
 /// The median of the planes through the neighbours below along x, y and z (a, b, c) and along two of these.
@@ -68,9 +71,8 @@ VOX_HD_HOT uint32_t predict_median(uint32_t a, uint32_t b, uint32_t c, uint32_t 
   return median(plane(a, b, ab, top), plane(a, c, ac, top), plane(b, c, bc, top));
 }
 
-/// Residuals become voxels, in place, in raster order: all <= top before, and so after.
-VOX_HD_HOT void invert(Transform transform, uint16_t* u, uint32_t top) {
-  if (transform == Transform::none) return;
+template <Transform transform>
+VOX_HD_HOT void invert_as(uint16_t* u, uint32_t top) {
   const uint16_t outside[4] = {};
   for (uint32_t z = 0; z < 4; ++z)
     for (uint32_t y = 0; y < 4; ++y) {
@@ -82,9 +84,9 @@ VOX_HD_HOT void invert(Transform transform, uint16_t* u, uint32_t top) {
       for (uint32_t x = 0; x < 4; ++x) {
         const uint32_t b = below_y[x], c = below_z[x], bc = below_yz[x];
         uint32_t voxel;
-        if (transform == Transform::previous) {
+        if constexpr (transform == Transform::previous) {
           voxel = unfold_modulo(row[x], x ? a : y ? b : c, top);
-        } else if (transform == Transform::median_modulo) {
+        } else if constexpr (transform == Transform::median_modulo) {
           voxel = unfold_modulo(row[x], predict_median(a, b, c, ab, ac, bc, top), top);
         } else {
           const uint32_t predicted = !z   ? plane(a, b, ab, top)
@@ -99,6 +101,20 @@ VOX_HD_HOT void invert(Transform transform, uint16_t* u, uint32_t top) {
         ac = c;
       }
     }
+}
+
+/// Residuals become voxels, in place, in raster order: all <= top before, and so after.
+VOX_HD_HOT void invert(Transform transform, uint16_t* u, uint32_t top) {
+  switch (transform) {
+    case Transform::none:
+      break;
+    case Transform::previous:
+      return invert_as<Transform::previous>(u, top);
+    case Transform::median_modulo:
+      return invert_as<Transform::median_modulo>(u, top);
+    case Transform::median_bounded:
+      return invert_as<Transform::median_bounded>(u, top);
+  }
 }
 
 }  // namespace voxkit::vq
