@@ -1,8 +1,8 @@
 #!/usr/bin/env python3
-"""An output appears whole or not at all: svmm-encode killed, stopped by signals, on a full disk, and where it may not
+"""An output appears whole or not at all: an encoder killed, stopped by signals, on a full disk, and where it may not
 write.
 
-    atomic_test.py --bin BUILD/bin [--kills N] [--seed N]
+    atomic_test.py --bin BUILD/bin [--tool svmm-encode|vq-encode] [--kills N] [--seed N]
 """
 import argparse
 import hashlib
@@ -17,13 +17,18 @@ import tempfile
 import time
 import unittest
 
-OPTIONS = argparse.Namespace(bin=None, kills=20, seed=1)
-# About 0.3 s and 47 MB: long enough to be killed in the middle of.
-WORK = ["menger:5", "-q", "100", "-j", "1"]
+OPTIONS = argparse.Namespace(bin=None, tool="svmm-encode", kills=20, seed=1)
+# About 0.3 s and over 10 MB: long enough to be killed in the middle of. Something for a pipe, and something endless.
+WORKS = {"svmm-encode": (["menger:5", "-q", "100", "-j", "1"], ["menger:4", "-q", "100"], "menger:7"),
+         "vq-encode": (["noise:250:1", "-j", "1"], ["noise:100:1"], "noise:4000:1")}
 
 
 def command(*arguments):
-    return [str(OPTIONS.bin / "svmm-encode"), *arguments]
+    return [str(OPTIONS.bin / OPTIONS.tool), *arguments]
+
+
+def work():
+    return WORKS[OPTIONS.tool][0]
 
 
 def digest(path):
@@ -36,7 +41,7 @@ class AtomicTest(unittest.TestCase):
         cls.whole_folder = tempfile.TemporaryDirectory()
         whole = pathlib.Path(cls.whole_folder.name) / "whole.svmm"
         start = time.monotonic()
-        subprocess.run(command(*WORK, "-o", str(whole)), check=True, stderr=subprocess.DEVNULL)
+        subprocess.run(command(*work(), "-o", str(whole)), check=True, stderr=subprocess.DEVNULL)
         cls.seconds = time.monotonic() - start
         cls.whole = digest(whole)
         cls.whole_bytes = whole.stat().st_size
@@ -50,13 +55,13 @@ class AtomicTest(unittest.TestCase):
         self.temporary = tempfile.TemporaryDirectory()
         self.addCleanup(self.temporary.cleanup)
         self.folder = pathlib.Path(self.temporary.name)
-        self.out = self.folder / "out.svmm"
+        self.out = self.folder / "out.file"
 
     def files(self):
         return sorted(path.name for path in self.folder.iterdir())
 
     def start(self, *more, **arguments):
-        return subprocess.Popen(command(*WORK, "-o", str(self.out), *more), stdout=subprocess.DEVNULL,
+        return subprocess.Popen(command(*work(), "-o", str(self.out), *more), stdout=subprocess.DEVNULL,
                                 stderr=subprocess.PIPE, text=True, **arguments)
 
     def finish(self, process, limit=60):
@@ -64,14 +69,15 @@ class AtomicTest(unittest.TestCase):
         return process.returncode, err
 
     def wait_for_temporary(self, process):
-        """Until the output has been begun."""
-        while process.poll() is None and not any(path.stat().st_size for path in self.folder.glob(".*")):
+        """Until the output has been begun; vq-encode writes at the end, so its file is empty until then."""
+        least = 0 if OPTIONS.tool == "vq-encode" else 1
+        while process.poll() is None and not any(path.stat().st_size >= least for path in self.folder.glob(".*")):
             time.sleep(0.001)
 
     def expect_error(self, code, err, expected_code, word):
         self.assertEqual(code, expected_code, err)
         self.assertEqual(err.count("\n"), 1, err)
-        self.assertTrue(err.startswith("svmm-encode: "), err)
+        self.assertTrue(err.startswith(OPTIONS.tool + ": "), err)
         self.assertIn(word, err)
 
     def test_kill(self):
@@ -99,7 +105,7 @@ class AtomicTest(unittest.TestCase):
                 self.assertFalse(force, f"kill {i}: the old file is gone")
                 self.assertNotEqual(code, 0)
             for left in self.folder.iterdir():
-                self.assertTrue(left.name.startswith(".out.svmm.voxkit-"), left.name)
+                self.assertTrue(left.name.startswith(".out.file.voxkit-"), left.name)
                 left.unlink()
         self.assertGreater(killed, OPTIONS.kills // 4)
         print(f"{killed} of {OPTIONS.kills} killed, {finished} whole files", file=sys.stderr)
@@ -117,7 +123,7 @@ class AtomicTest(unittest.TestCase):
                     code, err = self.finish(process)
                     self.assertEqual(code, 128 + number, err)
                     self.assertLessEqual(err.count("\n"), 1, err)
-                    self.assertEqual(self.files(), ["out.svmm"] if force else [])
+                    self.assertEqual(self.files(), ["out.file"] if force else [])
                     if force:
                         self.assertEqual(self.out.read_bytes(), b"old")
                         self.out.unlink()
@@ -145,23 +151,23 @@ class AtomicTest(unittest.TestCase):
         script = """
             mount -t tmpfs -o size=4m voxkit-test "$1" || exit 77
             cd "$1" && shift
-            "$@" -o out.svmm; echo "code $?"; ls -A
-            printf old > out.svmm
-            "$@" -o out.svmm --force; echo "code $?"; ls -A; cat out.svmm
+            "$@" -o out.file; echo "code $?"; ls -A
+            printf old > out.file
+            "$@" -o out.file --force; echo "code $?"; ls -A; cat out.file
         """
         namespace = ["unshare", "--mount"] if os.geteuid() == 0 else ["unshare", "--user", "--map-root-user", "--mount"]
         try:
-            done = subprocess.run([*namespace, "sh", "-c", script, "sh", str(self.folder), *command(*WORK)],
+            done = subprocess.run([*namespace, "sh", "-c", script, "sh", str(self.folder), *command(*work())],
                                   capture_output=True, text=True, timeout=60)
         except FileNotFoundError:
             self.skipTest("no unshare")
         if done.returncode == 77 or done.stderr.startswith("unshare:"):
             self.skipTest("mounting is not allowed here")
-        self.assertEqual(done.stdout, "code 4\ncode 4\nout.svmm\nold")
+        self.assertEqual(done.stdout, "code 4\ncode 4\nout.file\nold")
         lines = done.stderr.splitlines()
         self.assertEqual(len(lines), 2, lines)
         for line in lines:
-            self.assertTrue(line.startswith("svmm-encode: out.svmm: cannot be written after "), line)
+            self.assertTrue(line.startswith(OPTIONS.tool + ": out.file: cannot be written after "), line)
             self.assertIn("No space left on device", line)
 
     def test_full_device(self):
@@ -175,7 +181,7 @@ class AtomicTest(unittest.TestCase):
 
     def test_closed_pipe(self):
         read, write = os.pipe()
-        process = subprocess.Popen(command("menger:4", "-q", "100", "-o", "-"), stdout=write, stderr=subprocess.PIPE,
+        process = subprocess.Popen(command(*WORKS[OPTIONS.tool][1], "-o", "-"), stdout=write, stderr=subprocess.PIPE,
                                    text=True)
         os.close(write)
         os.read(read, 100)
@@ -184,15 +190,15 @@ class AtomicTest(unittest.TestCase):
         self.expect_error(code, err, 4, "cannot be written")
 
     def test_checked_before_any_work(self):
-        """What cannot be written is refused at once, before 39 GiB are encoded."""
+        """What cannot be written is refused at once, before tens of GiB are encoded."""
         (self.folder / "file").write_bytes(b"old")
         (self.folder / "locked").mkdir()
-        for name, word in (("none/out.svmm", "does not exist"), ("file", "exists: use --force"),
-                           ("locked", "is a folder"), ("file/out.svmm", "cannot be written"),
-                           ("/proc/out.svmm", "cannot be")):
+        for name, word in (("none/out.file", "does not exist"), ("file", "exists: use --force"),
+                           ("locked", "is a folder"), ("file/out.file", "cannot be written"),
+                           ("/proc/out.file", "cannot be")):
             with self.subTest(name=name):
                 start = time.monotonic()
-                process = subprocess.Popen(command("menger:7", "-j", "1", "-o", str(self.folder / name)),
+                process = subprocess.Popen(command(WORKS[OPTIONS.tool][2], "-j", "1", "-o", str(self.folder / name)),
                                            stderr=subprocess.PIPE, text=True)
                 code, err = self.finish(process, limit=20)
                 self.expect_error(code, err, 4, word)
@@ -213,6 +219,7 @@ class AtomicTest(unittest.TestCase):
 if __name__ == "__main__":
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("--bin", type=pathlib.Path, required=True)
+    parser.add_argument("--tool", choices=sorted(WORKS), default=OPTIONS.tool)
     parser.add_argument("--kills", type=int, default=OPTIONS.kills)
     parser.add_argument("--seed", type=int, default=OPTIONS.seed)
     OPTIONS, rest = parser.parse_known_args()
