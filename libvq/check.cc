@@ -105,22 +105,18 @@ class Checker {
     const uint64_t all = uint64_t{view_.blocks[0]} * view_.blocks[1] * view_.blocks[2];
     return parallel_for(ctx_, parts, [&](int64_t part) -> Status {
       const Bytes chunk = pools_.offsets(static_cast<uint64_t>(part));
+      if (chunk.data == nullptr) return volume_.store().status();
       const uint64_t first = static_cast<uint64_t>(part) << block_chunk_log2;
       const uint64_t blocks = std::min(all - first, uint64_t{1} << block_chunk_log2);
-      uint64_t start = blocks + 1;
-      for (uint64_t i = 0; i <= blocks; ++i) {
-        const auto stored = load_le<uint32_t>(chunk.data + i * block_header + 4);
-        if (stored != start)
-          return bad(fmt::format("chunk OFFS 0.{}, byte {}: entries at {}: expected {}", part,
-                                 i * block_header + 4, 8 * uint64_t{stored}, 8 * start));
-        if (i < blocks) start = load_le<uint32_t>(chunk.data + (i + 1) * block_header + 4);
-        if (start < stored || start - stored > widest_entry || 8 * start > chunk.size)
-          return bad(fmt::format("chunk OFFS 0.{}, byte {}: entries end at {}: expected up to {} bits each",
-                                 part, (i + 1) * block_header + 4, 8 * start, widest_entry));
-        if (i < blocks) VOX_CHECK(check_block(first + i));
+      for (uint64_t i = 0; i < blocks; ++i) {
+        const std::byte* const header = chunk.data + i * block_header;
+        const auto start = load_le<uint32_t>(header + 4), end = load_le<uint32_t>(header + 12);
+        if (end < start || end - start > widest_entry)
+          return bad(
+              fmt::format("chunk OFFS 0.{}, byte {}: entries from byte {} to {}: expected up to {} bits each",
+                          part, i * block_header + 4, uint64_t{start} * 8, uint64_t{end} * 8, widest_entry));
+        VOX_CHECK(check_block(first + i));
       }
-      if (8 * start != chunk.size)
-        return bad(fmt::format("chunk OFFS 0.{}: {} bytes: expected {}", part, chunk.size, 8 * start));
       return {};
     });
   }

@@ -39,7 +39,18 @@ Status Store::find_chunks(const Container& container) {
 }
 
 const std::byte* Store::verify(const Section& section, uint64_t part, const Container& container) const {
-  const auto chunk = container.chunk(section.chunks[part]);
+  auto chunk = container.chunk(section.chunks[part]);
+  if (chunk && &section == &offsets) {
+    // Of the entries' places the first and the last, as FORMAT.md has them; the others are looked at when
+    // used.
+    const uint64_t first = chunk_size(offsets_kind, part, view).least;
+    const auto start = [&](uint64_t header) { return load_le<uint32_t>(chunk->data() + header + 4); };
+    if (uint64_t{start(0)} * 8 != first || uint64_t{start(first - block_header)} * 8 != chunk->size())
+      chunk = bad_input(container.name(),
+                        fmt::format("chunk OFFS 0.{}: entries from byte {} to {}: expected {} to {}", part,
+                                    uint64_t{start(0)} * 8, uint64_t{start(first - block_header)} * 8, first,
+                                    chunk->size()));
+  }
   if (chunk) {
     section.found[part].store(chunk->data(), std::memory_order_release);
     return chunk->data();
