@@ -74,11 +74,12 @@ template <int packet_height, class View>
                                              Pixel* pixels, PixelDetail* details, Counts& count) {
   auto cursor = view.cursor();
 
+    Counts counted;  // here, not where tiles beside this one are counted by other threads
   const auto keep = [&](int x, int y, const Pixel& pixel, const PixelDetail& detail) {
     const int64_t i = static_cast<int64_t>(y) * params.width + x;
     pixels[i] = pixel;
-    count.hit += detail.voxel[0] >= 0;
-    count.cells += detail.cells;
+        counted.hit += detail.voxel[0] >= 0;
+    counted.cells += detail.cells;
     if (details != nullptr) details[i] = detail;
   };
   const auto blank = [&](int x0, int x1, int y0, int y1) {
@@ -126,8 +127,9 @@ template <int packet_height, class View>
   } else {
     cast_one_by_one(left, right, top, bottom);
   }
-  count.blocks = cursor.blocks();
-  count.bytes = cursor.bytes();
+    counted.blocks = cursor.blocks();
+  counted.bytes = cursor.bytes();
+  count = counted;
 }
 
 // The same code for two kinds of machine: packets fill a register.
