@@ -19,7 +19,7 @@ struct VoidBox {
 /// depends on nothing else, so what is remembered from other rays and other pictures changes no result.
 class VoidMemo {
  public:
-  /// What is void depends on `range`. 6 MB, which count against ctx.memory as long as it lives.
+  /// What is void depends on `range`. 12 MB, which count against ctx.memory as long as it lives.
   static Result<std::shared_ptr<VoidMemo>> create(const ValueRange& range, Context& ctx) {
     VOX_TRY(std::unique_ptr<Buffer> buffer, Buffer::allocate(size * sizeof(Slot), "a memo of void", ctx));
     return std::shared_ptr<VoidMemo>(new VoidMemo(range, std::move(buffer)));
@@ -68,7 +68,7 @@ class VoidMemo {
     std::atomic<uint32_t> log2_edge{0};  ///< and 1; 0: empty
     std::atomic<uint32_t> corner[3]{}, lo[3]{}, hi[3]{};
   };
-  static constexpr int log2_size = 17;
+  static constexpr int log2_size = 18;
   static constexpr size_t size = size_t{1} << log2_size;
   static size_t hash(const Key& key) {
     const uint64_t mixed =
