@@ -10,7 +10,8 @@ Result<std::shared_ptr<const DenseGrid>> DenseGrid::read(VolumeSource& source, C
   const auto voxels = checked_voxels(grid->info_.dims);
   if (!voxels || *voxels > uint64_t{1} << 56)
     return fail(ErrorCode::limit, {}, "the volume is too large to render uncompressed");
-  VOX_TRY(grid->buffer_, Buffer::allocate(*voxels * static_cast<uint64_t>(bytes), "the volume", ctx));
+  VOX_TRY(grid->buffer_, Buffer::allocate(*voxels * static_cast<uint64_t>(bytes) + DenseView::read_slack,
+                                          "the volume", ctx));
   const VoxelSpan all = packed(grid->buffer_->data(), grid->info_.dims, grid->info_.format);
   const Slabs slabs(grid->info_.box(), bytes, slab_target(ctx));
   for (int64_t i = 0; i < slabs.count(); ++i) {

@@ -25,6 +25,7 @@ struct Cell {
 
 /// The voxels of an uncompressed volume, on the host or a device.
 struct DenseView {
+  static constexpr int read_slack = 4;  ///< bytes behind the last voxel that may be read
   const std::byte* voxels;
   int64_t width, height;  ///< in voxels
   int bytes;              ///< of a voxel

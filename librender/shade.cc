@@ -7,6 +7,7 @@
 #include <utility>
 
 #include "formats/parallel.h"
+#include "librender/light.h"
 #include "librender/normals.h"
 #include "librender/occlusion.h"
 #include "librender/surface.h"
@@ -16,18 +17,9 @@ namespace {
 
 using glm::vec3;
 
-/// Over the viewer's left shoulder.
-vec3 light_of(const RayGenerator& rays) {
-  const glm::dvec3 forward = rays.forward();
-  const glm::dvec3 side = std::abs(forward.y) < 0.999
-                              ? glm::normalize(glm::cross(forward, glm::dvec3(0, 1, 0)))
-                              : glm::dvec3(1, 0, 0);
-  return glm::normalize(-forward - 0.5 * side + 0.6 * glm::cross(side, forward));
-}
-
-/// x to the power of 32.
-float power_32(float x) {
-  for (int i = 0; i < 5; ++i) x *= x;
+/// What is left of specular light.
+float shine(float x) {
+  for (int i = 0; i < log2_shine; ++i) x *= x;
   return x;
 }
 
@@ -93,8 +85,8 @@ Result<Picture> shade(const Frame& frame, const Camera& camera, double voxel, co
       if (Surface::hit(point) && options.phong) {
         const float* n = normals->row(y) + 3 * x;
         const vec3 normal(n[0], n[1], n[2]), half = glm::normalize(light - glm::normalize(point.at));
-        diffuse = 0.3f + 0.6f * std::max(0.0f, glm::dot(normal, light));
-        specular = 0.15f * power_32(std::max(0.0f, glm::dot(normal, half)));
+        diffuse = ambient_light + diffuse_light * std::max(0.0f, glm::dot(normal, light));
+        specular = specular_light * shine(std::max(0.0f, glm::dot(normal, half)));
       }
       if (openness) diffuse *= openness->row(y)[x];
       float* out = picture.row(y) + 4 * x;

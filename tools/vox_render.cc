@@ -9,20 +9,18 @@
 #include <utility>
 #include <vector>
 
-#include "formats/copy.h"
 #include "formats/image.h"
 #include "formats/output_file.h"
-#include "formats/readers.h"
 #include "libmetrics/image_diff.h"
 #include "libmetrics/ssim.h"
 #include "librender/camera_file.h"
-#include "librender/device_grid.h"
 #include "librender/layers.h"
 #include "librender/shade.h"
 #include "tools/common/input.h"
 #include "tools/common/json.h"
 #include "tools/common/main.h"
 #include "tools/common/retype.h"
+#include "tools/render_scene.h"
 
 namespace voxkit::cli {
 namespace {
@@ -33,7 +31,7 @@ constexpr int most_rays_a_side = 65536;  ///< of a picture
 
 struct Options {
   std::string input, output, path, report, reference;
-  OpenOptions open;
+  SceneOptions scene;
   int width = 1024, height = 768;
   std::string camera = "orbit:30,20,1.8", mode = "surface", traversal = "path", reference_traversal,
               shade = "phong", lod = "off", skip = "on", device = "cpu";
@@ -42,7 +40,9 @@ struct Options {
   std::vector<Layer> layers;
   bool wants(Layer layer) const { return std::find(layers.begin(), layers.end(), layer) != layers.end(); }
   double fov = 45;
-  std::optional<ValueRange> range;
+  // Direct volume rendering; empty where not given.
+  std::string transfer, gradient;
+  std::optional<double> step, modulate;
   bool no_images = false;
 };
 
@@ -99,8 +99,20 @@ void declare(CommandLine& line, Options& o) {
   line.option("--fov", "DEG", "Vertical field of view (45)", number(o.fov, 0.01, 179));
   line.text("--path", "PATH",
             "A camera path: thesis94, orbit:N or FILE.json, as tools/README.md describes it", o.path);
-  line.option("--mode", "MODE", "surface: shades what a ray meets first (surface)",
-              one_of(o.mode, {"surface"}));
+  line.option("--mode", "MODE",
+              "surface: shades what a ray meets first; dvr: direct volume rendering, of scalars (surface)",
+              one_of(o.mode, {"surface", "dvr"}));
+  line.text("--tf", "TF", "dvr: transfer function, FILE.json or one of " + transfer_presets() + " (gray)",
+            o.transfer);
+  line.option("--step", "S", "dvr: distance of samples in smallest voxel edges (0.25)",
+              number(o.step, least_step, greatest_step));
+  line.option("--gradient", "KIND",
+              "dvr: analytic: of the trilinear cell; neighbour: from samples of neighbouring rays (analytic)",
+              one_of(o.gradient, {"analytic", "neighbour"}));
+  line.option("--modulate", "G",
+              "dvr: multiply opacity by G times the gradient, in widths of the transfer function a voxel, up "
+              "to 1 (0: off)",
+              number(o.modulate, 0, 1e6));
   line.option("--traversal", "KIND",
               "path: keeps the path of blocks; restart: from the root at every step; baseline: voxel by "
               "voxel in floats, uncompressed volumes only (path)",
@@ -116,64 +128,22 @@ void declare(CommandLine& line, Options& o) {
       "the ray at the pixel's centre",
       [&o](const std::string& text) { return parse_layers(text, o.layers); });
   line.option("--lod", "on|off", "Stop at voxels as small as a pixel (off)", one_of(o.lod, {"on", "off"}));
-  line.option("--skip", "on|off", "Step over whole cells of one value; off: voxel by voxel (on)",
-              one_of(o.skip, {"on", "off"}));
+  line.option(
+      "--skip", "on|off",
+      "Step over whole cells of one value, of what cannot be seen; off: voxel by voxel, all samples (on)",
+      one_of(o.skip, {"on", "off"}));
   line.option("--device", "DEVICE", "Where to render: cpu or cuda, a GPU (cpu)",
               one_of(o.device, {"cpu", "cuda"}));
-  declare_range_option(line, o.range,
-                       "Sample values that are shown as 0 and 1 (default: full scale, or measured)");
+  declare_range_option(
+      line, o.scene.range,
+      "Sample values that are shown as 0 and 1, or that a preset spans (default: full scale, or measured)");
   line.text("--reference", "INPUT2", "Render this as well, and report how far the pictures are apart",
             o.reference);
   line.option("--reference-traversal", "KIND", "That of the reference (as --traversal)",
               one_of(o.reference_traversal, {"path", "restart", "baseline"}));
   line.text("--report", "OUT.json", "Write what every frame cost", o.report);
   line.flag("--no-images", "Render and report only", o.no_images);
-  declare_input_options(line, o.open);
-}
-
-/// A volume that is ready to be drawn.
-struct Scene {
-  VolumeInfo info;
-  std::optional<SvmmGrid> compressed;
-  std::shared_ptr<const DenseGrid> dense;
-  std::unique_ptr<const DeviceGrid> device;  ///< one of them on the GPU
-  ValueRange range{0, 255};
-
-  Status draw(const Camera& camera, CastOptions options, Frame& frame, Context& ctx) const {
-    options.range = range;
-    if (device) return device->cast(camera, options, frame);
-    return compressed ? cast(*compressed, camera, options, frame, ctx)
-                      : cast(*dense, camera, options, frame, ctx);
-  }
-};
-
-Result<Scene> open_scene(const std::string& name, const Options& o, Run& run) {
-  VOX_TRY(Input input, open_input(name, o.open, run.ctx));
-  Scene scene;
-  scene.info = input.source->info();
-  const VoxelFormat format = scene.info.format;
-  if (o.range) {
-    scene.range = {o.range->lo + scene.info.bias(), o.range->hi + scene.info.bias()};
-  } else if (format == VoxelFormat::density16 || format == VoxelFormat::float32) {
-    if (name == "-")
-      return bad_usage(
-          "the values of a stream cannot be looked at twice: give their range with --range LO,HI");
-    run.stage("measure");
-    VOX_TRY(const Input again, open_input(name, o.open, run.ctx));
-    VOX_TRY(scene.range, measure_range(*again.source, run.ctx));
-  }
-  if (input.svmm) {
-    scene.compressed.emplace(input.svmm);
-  } else {
-    run.stage("read");
-    VOX_TRY(scene.dense, DenseGrid::read(*input.source, run.ctx));
-  }
-  if (o.device == "cuda") {
-    run.stage("upload");
-    VOX_TRY(scene.device, scene.compressed ? DeviceGrid::upload(*scene.compressed, run.ctx)
-                                           : DeviceGrid::upload(*scene.dense, run.ctx));
-  }
-  return scene;
+  declare_input_options(line, o.scene.open);
 }
 
 /// An 8-bit RGB picture.
@@ -228,15 +198,14 @@ struct Costs {
   double mrays_per_s() const {
     return static_cast<double>(rays) / 1e3 / std::max(average() * static_cast<double>(ms.size()), 1e-9);
   }
-  void add(const Frame& frame, Json json) {
+  void add(const DvrFrame& frame, Json json) {
     ms.push_back(frame.seconds * 1000);
     rays += frame.rays;
     json.set("ms", ms.back())
         .set("rays", frame.rays)
         .set("rays_hit", frame.rays_hit)
-        .set("samples", uint64_t{0});
+        .set("samples", frame.samples);
     json.set("cells_visited", frame.cells_visited).set("blocks_touched", frame.blocks_touched);
-    json.set("bytes_touched", frame.bytes_touched);
     json.set("bytes_touched", frame.bytes_touched);
     frames.push(std::move(json));
   }
@@ -257,7 +226,30 @@ Result<std::string> frame_name(const std::string& pattern, size_t frame) {
          pattern.substr(d + 1);
 }
 
+/// Options that do not go with the mode.
+Status check_mode(const Options& o) {
+  if (o.mode != "dvr") {
+    const char* const given = !o.transfer.empty()   ? "--tf"
+                              : o.step              ? "--step"
+                              : !o.gradient.empty() ? "--gradient"
+                              : o.modulate          ? "--modulate"
+                                                    : nullptr;
+    return given == nullptr ? Status{} : bad_usage(fmt::format("{}: expected --mode dvr", given));
+  }
+  if (o.device == "cuda") return bad_usage("--mode dvr: not on GPUs: expected --device cpu");
+  const bool wrong[] = {o.traversal != "path" || !o.reference_traversal.empty(),
+                        o.shade.find("ssao") != std::string::npos, o.depth_antialias, o.lod == "on"};
+  const char* const expected[] = {"--traversal: expected path", "--shade: expected none or phong",
+                                  "--aa: expected none or ssaa:N", "--lod: expected off"};
+  for (int i = 0; i < 4; ++i)
+    if (wrong[i]) return bad_usage(fmt::format("{} with --mode dvr", expected[i]));
+  if (o.scene.range && !o.transfer.empty() && !is_transfer_preset(o.transfer))
+    return bad_usage("--range: expected a preset, whose values it gives, not a file");
+  return o.transfer.empty() ? Status{} : check_transfer(o.transfer);
+}
+
 Result<int> work(const Options& o, Run& run) {
+  VOX_CHECK(check_mode(o));
   if (!o.reference_traversal.empty() && o.reference.empty())
     return bad_usage("--reference-traversal: there is no reference: expected --reference INPUT2");
   if (o.device == "cuda") VOX_CHECK(check_device());
@@ -305,13 +297,38 @@ Result<int> work(const Options& o, Run& run) {
   shade_options.ssao = o.shade.find("ssao") != std::string::npos;
   shade_options.depth_antialias = o.depth_antialias;
 
-  VOX_TRY(const Scene scene, open_scene(o.input, o, run));
+  const bool dvr = o.mode == "dvr";
+  DvrOptions dvr_options;
+  dvr_options.width = cast_options.width;
+  dvr_options.height = cast_options.height;
+  dvr_options.step = o.step.value_or(0.25);
+  dvr_options.gradient = o.gradient == "neighbour" ? Gradient::neighbour : Gradient::analytic;
+  dvr_options.modulate = o.modulate.value_or(0);
+  dvr_options.lit = shade_options.phong;
+  dvr_options.skip = cast_options.skip;
+  dvr_options.details = cast_options.details;
+  if (dvr) shade_options.phong = false;  // every sample is lit by itself
+
+  SceneOptions scene_options = o.scene;
+  scene_options.dvr = dvr;
+  scene_options.cuda = o.device == "cuda";
+  VOX_TRY(Scene scene, open_scene(o.input, scene_options, run));
   std::optional<Scene> other;
   if (!o.reference.empty()) {
-    VOX_TRY(other, open_scene(o.reference, o, run));
+    VOX_TRY(other, open_scene(o.reference, scene_options, run));
     if (other->info.dims != scene.info.dims)
       return bad_usage(fmt::format("--reference {}: {} x {} x {} voxels: expected as many as the input has",
                                    o.reference, other->info.dims.x, other->info.dims.y, other->info.dims.z));
+  }
+  if (dvr) {
+    // Both are seen through one function: where it depends on values, on those of the reference.
+    run.stage("classify");
+    VOX_TRY(const TransferFunction transfer,
+            find_transfer(o.transfer.empty() ? "gray" : o.transfer, scene_options, other ? *other : scene));
+    for (Scene* const each : {&scene, other ? &*other : nullptr})
+      if (each != nullptr) {
+        VOX_TRY(each->dvr, DvrScene::create(each->volume, transfer, run.ctx));
+      }
   }
   const double edge = GridTransform(scene.info).largest_edge();
   const auto shaded = [&](const Frame& seen, const Camera& from, bool with_normals) -> Result<Picture> {
@@ -325,11 +342,11 @@ Result<int> work(const Options& o, Run& run) {
 
   run.stage("render");
   Costs costs, other_costs;
-  Frame frame, expected;  // their memory serves all frames
+  DvrFrame frame, expected;  // their memory serves all frames
   double rmse = 0, psnr = 0, ms_ssim = 0;
   const double count = static_cast<double>(cameras.size());
   for (size_t i = 0; i < cameras.size(); ++i) {
-    VOX_CHECK(scene.draw(cameras[i], cast_options, frame, run.ctx));
+    VOX_CHECK(scene.draw(cameras[i], cast_options, dvr_options, frame, run.ctx));
     Json json = Json::object();
     std::optional<Image> picture;
     if (pictures) {
@@ -347,7 +364,7 @@ Result<int> work(const Options& o, Run& run) {
     if (other) {
       CastOptions reference_options = cast_options;
       if (!o.reference_traversal.empty()) reference_options.traversal = traversal_of(o.reference_traversal);
-      VOX_CHECK(other->draw(cameras[i], reference_options, expected, run.ctx));
+      VOX_CHECK(other->draw(cameras[i], reference_options, dvr_options, expected, run.ctx));
       VOX_TRY(const Picture floats, shaded(expected, cameras[i], false));
       VOX_TRY(const Image reference, image_of(floats.rgba, run.ctx));
       VOX_TRY(const ImageDiff diff, diff_images(reference, *picture, std::nullopt, run.ctx));
@@ -366,6 +383,10 @@ Result<int> work(const Options& o, Run& run) {
   Json json = Json::result();
   json.set("tool", run.tool).set("version", version_text()).set("input", o.input).set("device", o.device);
   json.set("size", fmt::format("{}x{}", o.width, o.height)).set("mode", o.mode).set("traversal", o.traversal);
+  if (dvr) {
+    const Index3 bricks = scene.volume->ranges().bricks();
+    json.set("bricks", bricks.x * bricks.y * bricks.z).set("bricks_visible", scene.dvr->visible_bricks());
+  }
   costs.write(json);
   if (other) {
     Json reference = Json::object();
@@ -401,6 +422,7 @@ int main(int argc, char** argv) {
       "  vox-render scan.svmm -o scan.png --camera orbit:120,30,1.6 --size 1920x1080 --shade phong+ssao\n"
       "  vox-render scan.svmm -o scan.exr --aa ssaa:3 --aov depth,normal\n"
       "  vox-render scan.svmm -o frame-%04d.png --path flight.json\n"
+      "  vox-render scan.vqv -o bones.png --mode dvr --tf ct-bone\n"
       "  vox-render scan.svmm -o scan.png --reference scan.nrrd\n"
       "  vox-render scan.svmm --path thesis94 --no-images --report cost.json\n",
       [&](CommandLine& line) { declare(line, options); }, [&](Run& run) { return work(options, run); });

@@ -1,0 +1,109 @@
+#include "tools/render_scene.h"
+
+#include <fmt/core.h>
+
+#include "formats/copy.h"
+#include "tools/common/input.h"
+
+namespace voxkit::cli {
+
+using namespace voxkit::render;
+
+namespace {
+
+/// The volume's file, if the error is about voxels and names none.
+tl::unexpected<Error> named(Error error, const std::string& name) {
+  if (error.code == ErrorCode::input && error.file.empty()) error.file = name;
+  return tl::unexpected<Error>(std::move(error));
+}
+
+/// For direct volume rendering: from the compressed form where there is one.
+Result<std::shared_ptr<const DvrVolume>> open_volume(Input& input, Run& run) {
+  if (is_colour(input.source->info().format))
+    return bad_input({}, fmt::format("voxels are {}: expected a scalar volume for --mode dvr",
+                                     voxkit::name(input.source->info().format)));
+  const auto opened = [&]() -> Result<DvrVolume> {
+    if (input.svmm) {
+      run.stage("measure");
+      return DvrVolume::open(input.svmm, run.ctx);
+    }
+    if (input.vq) return DvrVolume::open(input.vq, run.ctx);
+    run.stage("read");
+    VOX_TRY(auto grid, DenseGrid::read(*input.source, run.ctx));
+    return DvrVolume::open(std::move(grid), run.ctx);
+  };
+  VOX_TRY(DvrVolume volume, opened());
+  return std::make_shared<const DvrVolume>(std::move(volume));
+}
+
+}  // namespace
+
+Status Scene::draw(const Camera& camera, CastOptions options, const DvrOptions& dvr_options, DvrFrame& frame,
+                   Context& ctx) const {
+  if (dvr) return dvr->draw(camera, dvr_options, frame, ctx);
+  options.range = range;
+  if (device) return device->cast(camera, options, frame);
+  return compressed ? cast(*compressed, camera, options, frame, ctx)
+                    : cast(*dense, camera, options, frame, ctx);
+}
+
+Result<Scene> open_scene(const std::string& name, const SceneOptions& o, Run& run) {
+  VOX_TRY(Input input, open_input(name, o.open, run.ctx));
+  Scene scene;
+  scene.info = input.source->info();
+  if (o.dvr) {
+    auto volume = open_volume(input, run);
+    if (!volume) return named(std::move(volume).error(), name);
+    scene.volume = std::move(*volume);
+    return scene;
+  }
+  const VoxelFormat format = scene.info.format;
+  if (o.range) {
+    scene.range = {o.range->lo + scene.info.bias(), o.range->hi + scene.info.bias()};
+  } else if (format == VoxelFormat::density16 || format == VoxelFormat::float32) {
+    if (name == "-")
+      return bad_usage(
+          "the values of a stream cannot be looked at twice: give their range with --range LO,HI");
+    run.stage("measure");
+    VOX_TRY(const Input again, open_input(name, o.open, run.ctx));
+    VOX_TRY(scene.range, measure_range(*again.source, run.ctx));
+  }
+  if (input.svmm) {
+    scene.compressed.emplace(input.svmm);
+  } else {
+    run.stage("read");
+    VOX_TRY(scene.dense, DenseGrid::read(*input.source, run.ctx));
+  }
+  if (o.cuda) {
+    run.stage("upload");
+    VOX_TRY(scene.device, scene.compressed ? DeviceGrid::upload(*scene.compressed, run.ctx)
+                                           : DeviceGrid::upload(*scene.dense, run.ctx));
+  }
+  return scene;
+}
+
+Status check_transfer(const std::string& name) {
+  if (is_transfer_preset(name) || name.ends_with(".json")) return {};
+  return bad_usage(
+      fmt::format("--tf: \"{}\": expected a file, FILE.json, or one of {}", name, transfer_presets()));
+}
+
+Result<TransferFunction> find_transfer(const std::string& name, const SceneOptions& o,
+                                       const Scene& measured) {
+  const double bias = measured.info.bias();
+  if (!is_transfer_preset(name)) {
+    VOX_TRY(std::vector<TransferPoint> points, read_transfer_file(name));
+    for (TransferPoint& point : points) point.value += bias;
+    return TransferFunction(std::move(points));
+  }
+  ValueRange range{0, 255};
+  if (o.range)
+    range = {o.range->lo + bias, o.range->hi + bias};
+  else if (measured.info.format == VoxelFormat::bitmap)
+    range = {0, 1};
+  else if (measured.info.format != VoxelFormat::density8)
+    range = measured.volume->ranges().all();
+  return *transfer_preset(name, range);
+}
+
+}  // namespace voxkit::cli

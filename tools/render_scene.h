@@ -1,0 +1,48 @@
+// The volumes that vox-render draws: how they are read, and what draws them.
+#pragma once
+
+#include <memory>
+#include <optional>
+#include <string>
+
+#include "formats/readers.h"
+#include "librender/device_grid.h"
+#include "librender/dvr.h"
+#include "tools/common/main.h"
+
+namespace voxkit::cli {
+
+/// What is asked of a volume.
+struct SceneOptions {
+  OpenOptions open;
+  std::optional<ValueRange> range;  ///< sample values
+  bool dvr = false;
+  bool cuda = false;
+};
+
+/// A volume that is ready to be drawn.
+struct Scene {
+  VolumeInfo info;
+  // Surfaces: one of the first two, on the GPU or not.
+  std::optional<render::SvmmGrid> compressed;
+  std::shared_ptr<const render::DenseGrid> dense;
+  std::unique_ptr<const render::DeviceGrid> device;
+  ValueRange range{0, 255};  ///< stored values
+  // Direct volume rendering.
+  std::shared_ptr<const render::DvrVolume> volume;
+  std::optional<render::DvrScene> dvr;
+
+  Status draw(const render::Camera& camera, render::CastOptions options,
+              const render::DvrOptions& dvr_options, render::DvrFrame& frame, Context& ctx) const;
+};
+
+Result<Scene> open_scene(const std::string& name, const SceneOptions& options, Run& run);
+
+/// A transfer function by the name of a file or a preset, in sample values; presets span `range` of
+/// `measured`. Errors: those of files; ErrorCode::usage where it is neither.
+Result<render::TransferFunction> find_transfer(const std::string& name, const SceneOptions& options,
+                                               const Scene& measured);
+/// Whether `find_transfer` may find something, without looking at a volume or a file.
+Status check_transfer(const std::string& name);
+
+}  // namespace voxkit::cli
