@@ -87,7 +87,7 @@ VOX_HD_HOT Interpolated<Real> interpolate(const Real (&v)[8], const Vec<Real>& a
 template <class Real>
 struct Solved {
   Vec<Real> gradient;
-  decltype(Real{} < Real{}) accepted;
+  decltype((Real{} < Real{}) & (Real{} < Real{})) accepted;
 };
 template <class Lanes, class Real>
 VOX_HD_HOT Solved<Real> solve_gradient(const Vec<Real> (&way)[3], const Real (&difference)[3]) {

@@ -58,8 +58,15 @@ VOX_HD_HOT int32_t float_as_bits(float x) {
 
 /// For any machine.
 struct PortableLanes {
-  VOX_HD_HOT static Floats least(const Floats& a, const Floats& b) { return a < b ? a : b; }
-  VOX_HD_HOT static Floats greatest(const Floats& a, const Floats& b) { return a > b ? a : b; }
+  template <class Real>
+  VOX_HD_HOT static Real least(const Real& a, const Real& b) {
+    return a < b ? a : b;
+  }
+  template <class Real>
+  VOX_HD_HOT static Real greatest(const Real& a, const Real& b) {
+    return a > b ? a : b;
+  }
+  VOX_HD_HOT static float root(float x) { return std::sqrt(x); }
   VOX_HD_HOT static Floats root(const Floats& x) {
     Floats y;
     for (int i = 0; i < dvr_lanes; ++i) y[i] = std::sqrt(x[i]);

@@ -1,0 +1,176 @@
+// Gradients: how far they are from those of the function that was sampled, and where none can be had.
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <cmath>
+#include <functional>
+#include <glm/geometric.hpp>
+#include <random>
+#include <vector>
+
+#include "librender/dvr_kernel.h"
+
+namespace voxkit::render {
+namespace {
+
+using Function = std::function<double(const glm::dvec3&)>;
+
+/// Of Marschner and Lobb, within -1 .. 1, on a grid of 40 voxels; and of a sphere with a soft edge.
+double marschner_lobb(const glm::dvec3& voxel) {
+  const glm::dvec3 p = voxel / 20.0 - 1.0;
+  const double r = std::sqrt(p.x * p.x + p.y * p.y), pi = 3.14159265358979;
+  const double rho = std::cos(2 * pi * 6 * std::cos(pi * r / 2));
+  return 255 * (1 - std::sin(pi * p.z / 2) + 0.25 * (1 + rho)) / (2 * 1.25);
+}
+double ball(const glm::dvec3& voxel) {
+  return 255 / (1 + std::exp(glm::length(voxel - 20.0) - 12));
+}
+glm::dvec3 gradient_of(const Function& f, const glm::dvec3& at) {
+  glm::dvec3 g;
+  for (int a = 0; a < 3; ++a) {
+    glm::dvec3 d(0);
+    d[a] = 1e-4;
+    g[a] = (f(at + d) - f(at - d)) / 2e-4;
+  }
+  return g;
+}
+Interpolated<float> sample(const Function& f, const glm::dvec3& at) {
+  const glm::dvec3 cell = glm::floor(at);
+  float v[8];
+  for (int i = 0; i < 8; ++i) v[i] = static_cast<float>(f(cell + glm::dvec3(i & 1, i >> 1 & 1, i >> 2)));
+  const glm::vec3 within(at - cell);
+  return interpolate<true>(v, Vec<float>{within.x, within.y, within.z});
+}
+double degrees_between(const glm::dvec3& a, const Vec<float>& b) {
+  const glm::dvec3 c(b.x, b.y, b.z);
+  return std::acos(std::clamp(glm::dot(glm::normalize(a), glm::normalize(c)), -1.0, 1.0)) * 57.29577951308232;
+}
+
+struct Errors {
+  double mean, rare;  ///< the rare one: the 99.9th percentile
+};
+Errors errors(std::vector<double> angles) {
+  std::sort(angles.begin(), angles.end());
+  double sum = 0;
+  for (const double a : angles) sum += a;
+  const auto n = static_cast<double>(angles.size());
+  return {sum / n, angles[static_cast<size_t>(n * 0.999)]};
+}
+
+/// Samples where there is something to light, as rays of a picture take them: neighbours 0.4 voxels apart,
+/// depths half a voxel, seen from any side.
+void measure(const Function& f, Errors& analytic, Errors& neighbour) {
+  std::mt19937 random(7);
+  std::uniform_real_distribution<double> place(6, 34), unit(-1, 1);
+  std::vector<double> cell, rays;
+  while (cell.size() < 20000) {
+    const glm::dvec3 at(place(random), place(random), place(random));
+    const glm::dvec3 expected = gradient_of(f, at);
+    if (glm::length(expected) < 4) continue;
+    const Interpolated<float> here = sample(f, at);
+    cell.push_back(degrees_between(expected, here.gradient));
+    const glm::dvec3 ahead = glm::normalize(glm::dvec3(unit(random), unit(random), unit(random)) + 1e-3);
+    const glm::dvec3 right = glm::normalize(glm::cross(ahead, glm::dvec3(0.3, 0.9, 0.1))),
+                     down = glm::cross(ahead, right);
+    const glm::dvec3 ways[3] = {right * 0.4 + ahead * 0.02, down * 0.4, ahead * 0.5};
+    Vec<float> way[3];
+    float difference[3];
+    for (int i = 0; i < 3; ++i) {
+      way[i] = {static_cast<float>(ways[i].x), static_cast<float>(ways[i].y), static_cast<float>(ways[i].z)};
+      difference[i] = sample(f, at + ways[i]).value - here.value;
+    }
+    const auto solved = solve_gradient<PortableLanes>(way, difference);
+    ASSERT_TRUE(solved.accepted);
+    rays.push_back(degrees_between(expected, solved.gradient));
+  }
+  analytic = errors(cell), neighbour = errors(rays);
+}
+
+TEST(DvrGradient, IsNearThatOfTheFunction) {
+  Errors analytic, neighbour;
+  measure(ball, analytic, neighbour);
+  RecordProperty("sphere", std::to_string(analytic.mean) + " " + std::to_string(analytic.rare) + " " +
+                               std::to_string(neighbour.mean) + " " + std::to_string(neighbour.rare));
+  EXPECT_LT(analytic.mean, 3);
+  EXPECT_LT(analytic.rare, 9);
+  EXPECT_LT(neighbour.mean, 4);
+  EXPECT_LT(neighbour.rare, 12);
+  measure(marschner_lobb, analytic, neighbour);
+  RecordProperty("marschner_lobb", std::to_string(analytic.mean) + " " + std::to_string(analytic.rare) + " " +
+                                       std::to_string(neighbour.mean) + " " + std::to_string(neighbour.rare));
+  EXPECT_LT(analytic.mean, 15);
+  EXPECT_LT(neighbour.mean, 18);
+}
+
+TEST(DvrGradient, OfALinearFunctionIsExact) {
+  std::mt19937 random(3);
+  std::uniform_real_distribution<float> unit(-1, 1);
+  for (int i = 0; i < 1000; ++i) {
+    const Vec<float> g{unit(random), unit(random), unit(random)};
+    Vec<float> way[3];
+    float difference[3];
+    for (int k = 0; k < 3; ++k) {
+      way[k] = {unit(random), unit(random), unit(random)};
+      difference[k] = dot(way[k], g);
+    }
+    const auto solved = solve_gradient<PortableLanes>(way, difference);
+    if (!solved.accepted) continue;
+    EXPECT_NEAR(solved.gradient.x, g.x, 2e-3);
+    EXPECT_NEAR(solved.gradient.y, g.y, 2e-3);
+    EXPECT_NEAR(solved.gradient.z, g.z, 2e-3);
+  }
+}
+
+TEST(DvrGradient, WaysInAPlaneAreRefused) {
+  const float difference[3] = {1, 2, 3};
+  const Vec<float> none{0, 0, 0}, x{1, 0, 0}, y{0, 1, 0}, xy{1, 1, 0}, nearly{1, 1, 1e-3f},
+      clear{1, 1, 5e-3f};
+  for (const auto& last : {none, x, xy, nearly}) {
+    const Vec<float> way[3] = {x, y, last};
+    EXPECT_FALSE(solve_gradient<PortableLanes>(way, difference).accepted);
+  }
+  const Vec<float> good[3] = {x, y, clear};
+  EXPECT_TRUE(solve_gradient<PortableLanes>(good, difference).accepted);
+  // Tiny ways, as of a narrow field of view, are as good as long ones.
+  const Vec<float> tiny[3] = {{1e-4f, 0, 0}, {0, 1e-4f, 0}, {0, 0, 1e-4f}};
+  EXPECT_TRUE(solve_gradient<PortableLanes>(tiny, difference).accepted);
+  const Vec<float> odd[3] = {{NAN, 0, 0}, {0, 1, 0}, {0, 0, 1}};
+  EXPECT_FALSE(solve_gradient<PortableLanes>(odd, difference).accepted);
+}
+
+TEST(DvrGradient, LightIsNeverNegativeNorNoNumber) {
+  std::mt19937 random(5);
+  std::uniform_real_distribution<float> unit(-1, 1);
+  const Vec<float> light{0.6f, 0.64f, 0.48f};
+  for (int i = 0; i < 10000; ++i) {
+    const float scale = std::ldexp(1.0f, i % 60 - 45);
+    const Vec<float> gradient{unit(random) * scale, unit(random) * scale,
+                              i % 7 == 0 ? 0 : unit(random) * scale};
+    const Vec<float> ahead{0, 0, -1}, half{0.35f, 0.37f, 0.86f};
+    const Lit<float> lit = light_sample<PortableLanes>(gradient, light, half, ahead, 1e-6f);
+    ASSERT_TRUE(lit.diffuse >= 0.3f && lit.diffuse <= 1 && lit.specular >= 0 && lit.specular < 0.2f);
+    // Which side is lit does not depend on the gradient's sign.
+    const Lit<float> other =
+        light_sample<PortableLanes>({-gradient.x, -gradient.y, -gradient.z}, light, half, ahead, 1e-6f);
+    if (gradient.z != 0) {
+      ASSERT_EQ(lit.diffuse, other.diffuse);
+    }
+  }
+}
+
+TEST(DvrArithmetic, PowersAndLogarithms) {
+  for (double x = 0; x < 120; x += 0.0137) {
+    const auto y = static_cast<double>(exp2_of_density<PortableLanes>(static_cast<float>(-x)));
+    ASSERT_NEAR(y / std::exp2(static_cast<double>(static_cast<float>(-x))), 1, 3e-7) << x;
+    const float share = static_cast<float>(std::exp2(-x));
+    ASSERT_NEAR(static_cast<double>(log2_of_share(share)), std::log2(static_cast<double>(share)),
+                2e-6 + x * 1e-7)
+        << x;
+  }
+  EXPECT_EQ(exp2_of_density<PortableLanes>(0.0f), 1);
+  EXPECT_EQ(exp2_of_density<PortableLanes>(-1e30f), 0x1p-126f);
+  EXPECT_EQ(log2_of_share(1.0f), 0);
+}
+
+}  // namespace
+}  // namespace voxkit::render

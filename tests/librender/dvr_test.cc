@@ -1,0 +1,325 @@
+// Direct volume rendering against a plain renderer in doubles, and against itself from every form of a
+// volume.
+#include "librender/dvr.h"
+
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <cmath>
+#include <cstring>
+#include <glm/geometric.hpp>
+#include <glm/vec4.hpp>
+
+#include "formats/readers.h"
+#include "librender/light.h"
+#include "tests/libsvmm/volumes.h"
+#include "tests/libvq/volumes.h"
+
+namespace voxkit::render {
+namespace {
+
+using vq::test::context;
+
+std::shared_ptr<const DenseGrid> dense(VolumeSource& source) {
+  Context ctx = context();
+  auto grid = DenseGrid::read(source, ctx);
+  EXPECT_TRUE(grid);
+  return *grid;
+}
+template <class T>
+DvrScene scene_of(std::shared_ptr<T> volume, const TransferFunction& transfer) {
+  Context ctx = context();
+  auto opened = DvrVolume::open(std::move(volume), ctx);
+  EXPECT_TRUE(opened) << opened.error().what;
+  auto scene = DvrScene::create(std::make_shared<const DvrVolume>(std::move(*opened)), transfer, ctx);
+  EXPECT_TRUE(scene) << scene.error().what;
+  return std::move(*scene);
+}
+DvrFrame draw(const DvrScene& scene, const Camera& camera, DvrOptions options, int threads = 2) {
+  Context ctx = context(threads);
+  options.details = true;
+  DvrFrame frame;
+  const Status status = scene.draw(camera, options, frame, ctx);
+  EXPECT_TRUE(status) << status.error().what;
+  return frame;
+}
+DvrOptions small(double step = 0.5) {
+  DvrOptions options;
+  options.width = 75;
+  options.height = 53;
+  options.step = step;
+  return options;
+}
+/// Nothing up to `lo`, most at `hi`, both within 0..255 or what the volume has.
+TransferFunction ramp(double lo, double hi) {
+  return TransferFunction(
+      {{lo, {1, 0.2, 0.1, 0}}, {(lo + hi) / 2, {0.9, 0.8, 0.3, 0.2}}, {hi, {0.2, 0.7, 1, 0.7}}});
+}
+
+/// Every pixel, and every count of samples that skipping may not change.
+void expect_same(const DvrFrame& a, const DvrFrame& b) {
+  ASSERT_EQ(a.pixels.size(), b.pixels.size());
+  EXPECT_EQ(0, std::memcmp(a.pixels.data(), b.pixels.data(), a.pixels.size() * sizeof(Pixel)));
+  EXPECT_EQ(a.rays_hit, b.rays_hit);
+}
+
+/// The plain renderer: one ray, one sample after the other, in doubles, the transfer function itself.
+class Reference {
+ public:
+  Reference(const DenseGrid& grid, const TransferFunction& transfer, const Camera& camera,
+            const DvrOptions& options)
+      : grid_(grid),
+        transfer_(transfer),
+        options_(options),
+        transform_(grid.info()),
+        rays_(camera, options.width, options.height) {}
+
+  glm::dvec4 pixel(int x, int y) const {
+    const double edge = transform_.smallest_edge(), step = options_.step * edge;
+    const glm::dvec3 world = rays_.direction(x + 0.5, y + 0.5);
+    const double along = glm::dot(world, rays_.forward());
+    const glm::dvec3 ahead = world / along;  // depth 1
+    const glm::dvec3 from = transform_.point(rays_.eye()), way = transform_.direction(ahead);
+    double t0 = 0, t1 = 1e9;
+    for (int a = 0; a < 3; ++a) {
+      const double side = static_cast<double>(grid_.info().dims[a]);
+      const double p = -from[a] / way[a], q = (side - from[a]) / way[a];
+      t0 = std::max(t0, std::min(p, q)), t1 = std::min(t1, std::max(p, q));
+    }
+    glm::dvec3 colour(0);
+    double through = 1;
+    for (double k = std::ceil(t0 / step); k * step <= t1 && through > 0.005; ++k) {
+      const glm::dvec3 at = from + way * (k * step) - 0.5;
+      const auto rgba = transfer_(value(at));
+      if (rgba[3] <= 0) continue;
+      glm::dvec3 shown(rgba[0], rgba[1], rgba[2]);
+      if (options_.lit) shown = lit(shown, at, glm::normalize(world));
+      const double alpha = 1 - std::pow(1 - rgba[3], options_.step / along);
+      colour += through * alpha * shown;
+      through *= 1 - alpha;
+    }
+    return {colour, 1 - through};
+  }
+
+  double value(glm::dvec3 at) const {
+    int64_t cell[3];
+    for (int a = 0; a < 3; ++a) {
+      const int64_t side = grid_.info().dims[a];
+      at[a] = std::clamp(at[a], 0.0, static_cast<double>(side - 1));
+      cell[a] = std::min(static_cast<int64_t>(at[a]), std::max<int64_t>(side - 2, 0));
+      at[a] -= static_cast<double>(cell[a]);
+    }
+    double sum = 0;
+    for (int i = 0; i < 8; ++i) {
+      double weight = 1;
+      int64_t v[3];
+      for (int a = 0; a < 3; ++a) {
+        weight *= i >> a & 1 ? at[a] : 1 - at[a];
+        v[a] = std::min(cell[a] + (i >> a & 1), grid_.info().dims[a] - 1);
+      }
+      const Voxel voxel = grid_.view().at(v[0], v[1], v[2]);
+      sum += weight * (grid_.info().format == VoxelFormat::float32 ? static_cast<double>(voxel.as<float>())
+                                                                   : voxel.as<uint32_t>());
+    }
+    return sum;
+  }
+
+ private:
+  glm::dvec3 lit(const glm::dvec3& colour, const glm::dvec3& at, const glm::dvec3& ahead) const {
+    glm::dvec3 gradient;
+    for (int a = 0; a < 3; ++a) {  // of the cell, in which values are linear along each axis
+      const double side = static_cast<double>(grid_.info().dims[a]);
+      glm::dvec3 lo = at, hi = at;
+      lo[a] = std::min(std::floor(std::clamp(at[a], 0.0, side - 1)), std::max(side - 2, 0.0)),
+      hi[a] = lo[a] + 1;
+      gradient[a] = (value(hi) - value(lo)) / transform_.voxel[a];
+    }
+    if (glm::length(gradient) == 0) return colour;
+    glm::dvec3 normal = glm::normalize(gradient);
+    if (glm::dot(normal, ahead) > 0) normal = -normal;
+    const glm::dvec3 light = light_of(rays_), half = glm::normalize(light - ahead);
+    return colour * (0.3 + 0.6 * std::max(0.0, glm::dot(normal, light))) +
+           0.15 * std::pow(std::max(0.0, glm::dot(normal, half)), 32);
+  }
+  const DenseGrid& grid_;
+  const TransferFunction& transfer_;
+  DvrOptions options_;
+  GridTransform transform_;
+  RayGenerator rays_;
+};
+
+/// A built-in with voxels of these edges.
+class Stretched final : public VolumeSource {
+ public:
+  Stretched(std::unique_ptr<VolumeSource> source, std::array<double, 3> spacing)
+      : source_(std::move(source)) {
+    info_ = source_->info();
+    info_.spacing = spacing;
+  }
+  Status read(const Box& box, VoxelSpan out) override { return source_->read(box, out); }
+
+ private:
+  std::unique_ptr<VolumeSource> source_;
+};
+std::unique_ptr<VolumeSource> stretched(const char* name, std::array<double, 3> spacing) {
+  return std::make_unique<Stretched>(std::move(*open_builtin(name)), spacing);
+}
+
+TEST(Dvr, IsThePlainRenderer) {
+  const std::array<double, 3> spacings[] = {{1, 1, 1}, {1, 0.5, 1.28}};
+  for (const char* name : {"marschner-lobb:21", "sphere:24", "noise:9:5"})
+    for (const auto& spacing : spacings)
+      for (const bool lit : {false, true}) {
+        const auto source = stretched(name, spacing);
+        const auto grid = dense(*source);
+        const TransferFunction transfer = ramp(90, 210);
+        DvrOptions options = small(0.37);
+        options.lit = lit;
+        const Camera camera = Camera::orbit(33, 21, 1.7, 40);
+        const DvrFrame frame = draw(scene_of(grid, transfer), camera, options);
+        const Reference reference(*grid, transfer, camera, options);
+        EXPECT_GT(frame.rays_hit, 500u);
+        double worst = 0, sum = 0;
+        for (int y = 0; y < options.height; ++y)
+          for (int x = 0; x < options.width; ++x) {
+            const glm::dvec4 expected = reference.pixel(x, y);
+            const Pixel& pixel = frame.pixels[static_cast<size_t>(y * options.width + x)];
+            for (int k = 0; k < 4; ++k) {
+              const double off = std::abs(static_cast<double>(pixel.colour[k]) - expected[k]);
+              worst = std::max(worst, off), sum += off;
+            }
+          }
+        // The table has steps of 1/4095 of the transfer function; a lit sample at a cell's edge may take the
+        // gradient of the next one, and rays end a sample apart.
+        EXPECT_LT(sum / (4 * options.width * options.height), lit ? 4e-4 : 5e-5) << name << " lit " << lit;
+        EXPECT_LT(worst, lit ? 0.1 : 6e-3) << name << " lit " << lit;
+      }
+}
+
+TEST(Dvr, IsTheSameFromEveryFormSkippedOrNotOnAnyMachine) {
+  const VolumeInfo infos[] = {vq::test::integer_info({37, 22, 29}, 8),
+                              vq::test::integer_info({18, 41, 13}, 12),
+                              vq::test::integer_info({16, 16, 16}, 16)};
+  uint32_t seed = 0;
+  for (const VolumeInfo& info : infos)
+    for (const auto content : {vq::test::Content::scan, vq::test::Content::noise, vq::test::Content::blobs}) {
+      const int bits = info.format == VoxelFormat::density8 ? 8 : info.dims.x == 18 ? 12 : 16;
+      const auto voxels = vq::test::make_voxels(info, content, bits, ++seed);
+      voxkit::test::MemorySource source(info, voxels);
+      const double top = (1 << bits) - 1;
+      const TransferFunction transfer = ramp(0.4 * top, 0.9 * top);
+      const DvrScene plain = scene_of(dense(source), transfer);
+      vq::Options packed;
+      packed.codebook = vq::Codebook::packed;
+      svmm::Params params = svmm::test::make_params(info.format, 100, {}, 4);
+      const DvrScene others[] = {
+          scene_of(vq::test::encode_to_memory(source).open(), transfer),
+          scene_of(vq::test::encode_to_memory(source, packed).open(), transfer),
+          scene_of(svmm::test::encode_to_memory(source, params).open(), transfer),
+      };
+      const Camera camera = Camera::orbit(200 + 10 * seed, 15, 1.4, 45);
+      for (const auto kind : {Gradient::analytic, Gradient::neighbour})
+        for (const double modulate : {0.0, 5.0}) {
+          DvrOptions options = small();
+          options.gradient = kind;
+          options.modulate = modulate;
+          const DvrFrame expected = draw(plain, camera, options);
+          EXPECT_GT(expected.rays_hit, 100u);
+          for (const DvrScene& scene : others) expect_same(draw(scene, camera, options, 3), expected);
+          options.native = false;
+          expect_same(draw(plain, camera, options, 1), expected);
+          expect_same(draw(others[0], camera, options, 1), expected);
+          options.skip = false;
+          const DvrFrame all = draw(plain, camera, options);
+          expect_same(all, expected);
+          EXPECT_GE(all.samples, expected.samples);
+          expect_same(draw(others[0], camera, options), expected);
+        }
+    }
+}
+
+TEST(Dvr, FloatsAndThinVolumes) {
+  for (const Index3 dims : {Index3(19, 8, 23), Index3(1, 30, 17), Index3(12, 1, 1), Index3(1, 1, 1)}) {
+    VolumeInfo info = voxkit::test::scalar_info(dims, SampleType::f32);
+    const auto voxels = vq::test::make_voxels(info, vq::test::Content::scan, 8, 4);
+    voxkit::test::MemorySource source(info, voxels);
+    const TransferFunction transfer = ramp(-3, 30);
+    svmm::Params params = svmm::test::make_params(info.format, 100, {}, 4);
+    params.full_scale = 60;
+    const DvrScene plain = scene_of(dense(source), transfer),
+                   compressed = scene_of(svmm::test::encode_to_memory(source, params).open(), transfer);
+    const Camera camera = Camera::orbit(20, 30, 1.5, 45);
+    const DvrFrame expected = draw(plain, camera, small());
+    expect_same(draw(compressed, camera, small()), expected);
+  }
+}
+
+TEST(Dvr, NoNumberAndInfinityShowNothingAndBreakNothing) {
+  const Index3 dims(12, 12, 12);
+  const VolumeInfo info = voxkit::test::scalar_info(dims, SampleType::f32);
+  auto voxels = vq::test::make_voxels(info, vq::test::Content::noise, 8, 9);
+  const float odd[] = {NAN, INFINITY, -INFINITY, 3e38f};
+  for (size_t i = 0; i < 200; ++i) std::memcpy(&voxels[i * 28], &odd[i % 4], 4);
+  voxkit::test::MemorySource source(info, voxels);
+  const DvrScene scene = scene_of(dense(source), ramp(0, 60));
+  for (const auto kind : {Gradient::analytic, Gradient::neighbour}) {
+    DvrOptions options = small();
+    options.gradient = kind;
+    const DvrFrame frame = draw(scene, Camera::orbit(20, 30, 1.5, 45), options);
+    EXPECT_GT(frame.rays_hit, 100u);
+    for (const Pixel& pixel : frame.pixels)
+      for (const float c : pixel.colour) ASSERT_TRUE(c >= 0 && c <= 1.5f) << c;
+    options.skip = false;
+    expect_same(draw(scene, Camera::orbit(20, 30, 1.5, 45), options), frame);
+  }
+}
+
+TEST(Dvr, OpacityDoesNotDependOnTheStepOrTheAngle) {
+  // Half of the light goes through an edge, wherever the ray runs: 1 - 2^-length.
+  const VolumeInfo info = vq::test::integer_info({8, 8, 8}, 8);
+  voxkit::test::MemorySource source(info, std::vector<std::byte>(512, std::byte{9}));
+  const DvrScene scene =
+      scene_of(dense(source), TransferFunction({{0, {1, 1, 1, 0.5}}, {9, {1, 1, 1, 0.5}}}));
+  const Camera camera{{0, 0, 3}, {0, 0, 0}, 30};
+  for (const double step : {0.05, 0.25}) {
+    DvrOptions options = small(step);
+    options.lit = false;
+    const DvrFrame frame = draw(scene, camera, options);
+    const Pixel& middle = frame.pixels[static_cast<size_t>(26 * 75 + 37)];
+    EXPECT_NEAR(middle.colour[3], 1 - std::exp2(-8.0), 0.004);
+    EXPECT_NEAR(middle.distance, 2.5, step / 8 + 1e-6);
+  }
+}
+
+TEST(Dvr, SkippingLooksAtLittle) {
+  auto source = open_builtin("sphere:96");
+  const auto volume = vq::test::encode_to_memory(**source).open();
+  const DvrScene scene = scene_of(volume, ramp(250, 255));
+  DvrOptions options = small();
+  const DvrFrame skipped = draw(scene, Camera::orbit(20, 30, 1.5, 45), options);
+  options.skip = false;
+  const DvrFrame all = draw(scene, Camera::orbit(20, 30, 1.5, 45), options);
+  expect_same(skipped, all);
+  EXPECT_LT(skipped.samples * 2, all.samples);
+  EXPECT_LT(skipped.cells_visited * 2, all.cells_visited);
+  EXPECT_LE(skipped.blocks_touched, all.blocks_touched);
+}
+
+TEST(Dvr, ColoursAndTooManySamplesAreRefused) {
+  Context ctx = context();
+  auto source = open_builtin("menger:1");
+  const auto refused = DvrVolume::open(dense(**source), ctx);
+  ASSERT_FALSE(refused);
+  EXPECT_EQ(refused.error().code, ErrorCode::input);
+  auto needle = voxkit::test::scalar_info({2, 2, 65536}, SampleType::u8);
+  needle.spacing = {0.01, 1, 1};
+  voxkit::test::MemorySource thin(needle, std::vector<std::byte>(4 * 65536));
+  DvrFrame frame;
+  const Status status =
+      scene_of(dense(thin), ramp(1, 2)).draw(Camera::orbit(0, 0, 2, 45), small(0.1), frame, ctx);
+  ASSERT_FALSE(status);
+  EXPECT_EQ(status.error().code, ErrorCode::usage);
+}
+
+}  // namespace
+}  // namespace voxkit::render
