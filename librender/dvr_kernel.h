@@ -116,10 +116,9 @@ VOX_HD_HOT Lit<Real> light_sample(const Vec<Real>& gradient, const Vec<float>& l
                                   const Vec<Real>& ahead, float flat) {
   const Real square = dot(gradient, gradient);
   const auto is_surface = square > flat * flat;
-  const Real least = square * 0 + 1e-36f;
+  const Real zero = half.x * 0, least = zero + 1e-36f;
   const Real scale = 1.0f / Lanes::root(Lanes::greatest(square, least));
   const Real towards = dot(gradient, ahead) > 0.0f ? -scale : scale;
-  const Real zero = square * 0;
   const Real n_light = Lanes::greatest(dot(gradient, light) * towards, zero);
   Real n_half = Lanes::greatest(dot(gradient, half) * towards, zero);
   for (int i = 0; i < log2_shine; ++i) n_half = n_half * n_half;
