@@ -1,0 +1,19 @@
+// The inner loops of the search with AVX2 and with AVX-512.
+#pragma once
+
+#include "libvq/cpu.h"
+#include "libvq/nearest_kernel.h"
+
+#ifdef VOXKIT_AVX2
+
+namespace voxkit::vq {
+
+/// Whether code for AVX-512 with VNNI may run here.
+bool has_avx512();
+
+const Kernels& avx2_kernels(bool narrow);
+const Kernels& avx512_kernels(bool narrow);
+
+}  // namespace voxkit::vq
+
+#endif
