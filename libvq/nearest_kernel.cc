@@ -94,7 +94,7 @@ QueryKey query_key(const Key& key, const Brick& brick, int32_t reach) {
   return query;
 }
 
-const Kernels& search_kernels(bool native, bool narrow) {
+const Kernels& search_kernels([[maybe_unused]] bool native, bool narrow) {
 #ifdef VOXKIT_AVX2
   if (native && has_avx512()) return avx512_kernels(narrow);
   if (native && has_avx2()) return avx2_kernels(narrow);
