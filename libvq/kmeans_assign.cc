@@ -152,8 +152,7 @@ Status Assigner::look_at_all(std::span<const Brick> centres, const Context& ctx)
       const auto positions = std::span(further_).subspan(begin, std::min(block, further_.size() - begin));
       queries.clear();
       for (const uint32_t p : positions) {
-        const Brick& brick = nearest_.tree->brick(p);
-        queries.add(space_.key(brick), brick, space_.reach(others_[p]));
+        queries.add(nearest_.tree->key(p), nearest_.tree->brick(p), space_.reach(others_[p]));
       }
       AllFinder finder{*this, positions};
       search(*tree_, *nearest_.kernels, tree_->root(), queries, queries.rows(),

@@ -22,7 +22,7 @@ inline constexpr int fine_axes = 2 * fine_pairs, coarse_axes = 2 * coarse_pairs;
 
 struct Key {
   std::array<int16_t, fine_axes> fine;      ///< 31 components and the norm of the rest, within +-key_limit
-  std::array<int16_t, coarse_axes> coarse;  ///< 15 components and the norm of the rest
+  std::array<int16_t, coarse_axes> coarse;  ///< the first 15 components and the norm of the rest
   uint32_t norm;                            ///< the squares of `fine` summed up, modulo 2^32
 };
 /// So that doubles of coordinates and differences of two fit 16 bits.

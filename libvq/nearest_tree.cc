@@ -98,6 +98,7 @@ Result<BrickTree> BrickTree::build(std::span<const Brick> bricks, const KeySpace
   tree.bricks_.resize(bricks.size());
   tree.leaves_.resize(leaves);
   tree.norms_.resize(leaves * leaf_bricks);
+  tree.rests_.resize(bricks.size());
   tree.boxes_.resize(2 * width);
 
   // The upper levels one node after the other, then what is below them side by side.
@@ -131,9 +132,21 @@ Result<BrickTree> BrickTree::build(std::span<const Brick> bricks, const KeySpace
 void BrickTree::place(size_t position, const Brick& brick, const Key& key) {
   bricks_[position] = brick;
   norms_[position] = key.norm;
+  rests_[position] = key.coarse.back();
   Leaf& leaf = leaves_[position / leaf_bricks];
   for (int j = 0; j < fine_pairs; ++j)
     leaf[static_cast<size_t>(j)][position % leaf_bricks] = key_pair(key.fine, j);
+}
+
+Key BrickTree::key(size_t position) const {
+  Key key;
+  const Leaf& leaf = leaves_[position / leaf_bricks];
+  for (size_t j = 0; j < fine_pairs; ++j)
+    std::memcpy(&key.fine[2 * j], &leaf[j][position % leaf_bricks], sizeof(int32_t));
+  std::copy_n(key.fine.begin(), coarse_axes - 1, key.coarse.begin());
+  key.coarse.back() = rests_[position];
+  key.norm = norms_[position];
+  return key;
 }
 
 void BrickTree::replace(size_t position, const Brick& brick, const Key& key) {

@@ -26,7 +26,7 @@ class BrickTree {
   /// bricks: at least one, less than 2^32. They are copied.
   static Result<BrickTree> build(std::span<const Brick> bricks, const KeySpace& space, const Context& ctx);
   /// Of memory, for each brick.
-  static constexpr uint64_t bytes_per_brick = sizeof(Brick) + sizeof(Leaf) / leaf_bricks + 12;
+  static constexpr uint64_t bytes_per_brick = sizeof(Brick) + sizeof(Leaf) / leaf_bricks + 14;
   /// While it is built, as well.
   static constexpr uint64_t bytes_to_build = sizeof(Key) + 8;
 
@@ -43,6 +43,7 @@ class BrickTree {
   uint32_t index(size_t position) const { return order_[position]; }
   const Brick& brick(size_t position) const { return bricks_[position]; }
   uint32_t norm(size_t position) const { return norms_[position]; }
+  Key key(size_t position) const;
   const Leaf& leaf(size_t leaf) const { return leaves_[leaf]; }
   /// One bit for each brick of a leaf.
   uint32_t present(size_t leaf) const {
@@ -64,6 +65,7 @@ class BrickTree {
   std::vector<Brick> bricks_;
   std::vector<Leaf> leaves_;
   std::vector<uint32_t> norms_;  // of the keys; whole leaves
+  std::vector<int16_t> rests_;   // the last coarse coordinates; the others are fine ones, too
   std::vector<KeyBox> boxes_;
 };
 

@@ -59,7 +59,7 @@ Status seed_d2(NearestCentres& nearest, const KeySpace& space, std::span<const u
       const Share r = random.below(sum);
       const auto i = static_cast<size_t>(std::upper_bound(shares.begin(), shares.end(), r) - shares.begin());
       const Brick& brick = tree.brick(position_of[i]);
-      const Key key = space.key(brick);
+      const Key key = tree.key(position_of[i]);
       const uint64_t was = first == 0 ? 1 : nearest.distance[position_of[i]];
       const uint64_t is = recent.nearest(brick, key, was, 0, space);
       if (r - (i == 0 ? 0 : shares[i - 1]) >= weights[i] * Share{is}) continue;

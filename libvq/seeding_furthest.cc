@@ -54,7 +54,7 @@ class FurthestFirst {
 
   void choose(size_t position) {
     centres_.push_back(nearest_.tree->brick(position));
-    recent_.add(space_.key(centres_.back()));
+    recent_.add(nearest_.tree->key(position));
   }
 
   /// All bricks that look at least `reach` far.
@@ -98,8 +98,8 @@ class FurthestFirst {
         choose(top.position);
         continue;
       }
-      const Brick& brick = nearest_.tree->brick(top.position);
-      top.distance = recent_.nearest(brick, space_.key(brick), top.distance, top.seen, space_);
+      top.distance = recent_.nearest(nearest_.tree->brick(top.position), nearest_.tree->key(top.position),
+                                     top.distance, top.seen, space_);
       top.seen = recent_.size();
       if (top < left_out || space_.reach(top.distance) < reach) continue;
       candidates_.push_back(top);

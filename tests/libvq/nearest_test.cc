@@ -277,6 +277,10 @@ TEST(BrickTree, HasEveryBrickOnce) {
       seen[tree->index(p)] = true;
       EXPECT_EQ(tree->brick(p), bricks[tree->index(p)]);
       EXPECT_EQ(tree->index(p), again->index(p));
+      const Key key = tree->key(p), expected = space.key(tree->brick(p));
+      EXPECT_EQ(key.fine, expected.fine);
+      EXPECT_EQ(key.coarse, expected.coarse);
+      EXPECT_EQ(key.norm, expected.norm);
     }
     for (const size_t parts : {1u, 4u, 256u}) {
       size_t leaf = 0;
