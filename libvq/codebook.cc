@@ -41,7 +41,7 @@ Result<uint32_t> UniqueCodes::add(BrickRange range, std::span<const std::byte> c
     const auto there = this->codeword(number);
     if (std::equal(there.begin(), there.end(), codeword.begin(), codeword.end())) return number;
   }
-  if (places_.size() >= most)
+  if (places_.size() >= uint64_t{most_codewords})
     return fail(ErrorCode::limit, {},
                 "more than 2^32 - 2 different bricks: expected fewer: encode the volume in parts");
   VOX_TRY(const uint64_t place, append(range, codeword));

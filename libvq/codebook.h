@@ -6,6 +6,7 @@
 
 #include "libvq/rbuc.h"
 #include "libvq/reservation.h"
+#include "libvq/vq.h"
 
 namespace voxkit::vq {
 
@@ -25,8 +26,6 @@ uint64_t hash_of(BrickRange range, std::span<const std::byte> codeword);
 /// Numbers bricks in the order in which they are first added.
 class UniqueCodes {
  public:
-  static constexpr uint32_t most = 0xfffffffe;  ///< bricks; 0xffffffff is never a number
-
   explicit UniqueCodes(Context& ctx) : reservation_(*ctx.memory) {}
 
   /// The number of a brick, a new one if none before was equal. ErrorCode::limit where memory or numbers run

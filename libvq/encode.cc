@@ -5,7 +5,7 @@
 #include <bit>
 #include <cmath>
 
-#include "libvq/collect.h"
+#include "libvq/cluster.h"
 
 namespace voxkit::vq {
 namespace {
@@ -215,6 +215,8 @@ Status validate(const Options& options, const VolumeInfo& info) {
     return bad_usage("--offsets direct: bricks of equal size have no addresses: use --codebook rbuc");
   if (options.max_error && !(*options.max_error >= 0 && std::isfinite(*options.max_error)))
     return bad_usage(fmt::format("--max-error {}: expected a number of at least 0", *options.max_error));
+  if ((options.codewords > 0) + (options.reduce > 0) + options.max_error.has_value() > 1)
+    return bad_usage("--codewords, --reduce and --max-error: expected one of them");
   return {};
 }
 
@@ -233,6 +235,7 @@ Result<Report> encode(VolumeSource& source, const Options& options, const ByteSi
   report.quantisation_error = collected.quantisation_error;
   report.params.unique_bricks = collected.codes.size();
   report.params.max_error = quantiser.bound();
+  VOX_CHECK(cluster(collected, options, source.info(), quantiser, report, ctx));
   return Writer(source.info(), options, quantiser, collected, sink, ctx).write(std::move(report));
 }
 

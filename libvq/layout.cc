@@ -21,6 +21,8 @@ std::vector<std::byte> pack_params(const Params& params, uint64_t common) {
   bytes[0] = static_cast<std::byte>(params.codebook);
   bytes[1] = static_cast<std::byte>(params.mapping);
   bytes[2] = static_cast<std::byte>(params.bits);
+  bytes[3] = static_cast<std::byte>(!params.seeding ? 0 : *params.seeding == Seeding::furthest ? 1 : 2);
+  store_le(&bytes[4], params.iterations);
   store_le(&bytes[8], params.codewords);
   store_le(&bytes[16], common);
   store_le(&bytes[24], params.base);
@@ -53,6 +55,8 @@ Result<ParamsAndView> unpack_params(std::span<const std::byte> bytes, const Volu
   p.codebook = static_cast<Codebook>(field(0));
   p.mapping = static_cast<Mapping>(field(1));
   p.bits = field(2);
+  if (field(3) == 1 || field(3) == 2) p.seeding = field(3) == 1 ? Seeding::furthest : Seeding::d2;
+  p.iterations = load_le<uint32_t>(&bytes[4]);
   p.codewords = number(8);
   const uint64_t common = number(16);
   p.base = load_le<double>(&bytes[24]);

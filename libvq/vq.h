@@ -8,13 +8,14 @@
 #pragma once
 
 #include <array>
+#include <functional>
 #include <memory>
 #include <optional>
 
 #include "formats/container.h"
 #include "formats/context.h"
 #include "formats/source.h"
-#include "libvq/brick.h"
+#include "libvq/kmeans.h"
 
 namespace voxkit::vq {
 
@@ -31,6 +32,9 @@ enum class Mapping : uint8_t {
   direct = 1,    ///< addresses in the codebook
   indirect = 2,  ///< numbers of bricks; of a codebook with variable length, tables have their addresses
 };
+/// Bricks that a codebook may have.
+inline constexpr int64_t most_codewords = 0xfffffffe;
+
 /// What an encoder is asked for.
 struct Options {
   Codebook codebook = Codebook::rbuc;
@@ -39,8 +43,17 @@ struct Options {
   /// (rounded down to a whole number), floats are quantised to it. Nothing: integers are exact, floats get
   /// 65536 levels.
   std::optional<double> max_error;
+  /// k-means to so many bricks, or to the number of unique bricks divided by `reduce` (at least one brick);
+  /// 0: no k-means, nor where that many bricks are all there are. Not with `max_error`.
+  uint64_t codewords = 0, reduce = 0;
+  Seeding seeding = Seeding::furthest;
+  uint32_t max_iterations = ~uint32_t{0};  ///< of k-means; more only while clusters would be empty
   /// FLOAT32: least and greatest stored value, as from `measure_range`.
   ValueRange range;
+  /// Told before k-means begins, and then of the PSNR so far (of peak `full_scale`), after seeding and after
+  /// each iteration, on the calling thread. May be empty.
+  std::function<void()> clustering;
+  std::function<void(uint32_t iteration, double psnr_db)> clustered;
 };
 
 /// What a file says about itself.
@@ -52,9 +65,11 @@ struct Params {
   double base = 0;         ///< the stored value of code 0 ...
   double step = 1;         ///< ... and the distance to that of the next one
   // For the reader's information.
-  double max_error = 0;        ///< no voxel is further than this from the original; -1: no promise
-  uint64_t unique_bricks = 0;  ///< of the volume that was compressed
-  int offset_bits = 0;         ///< of the widest entries of the offset volume
+  double max_error = 0;            ///< no voxel is further than this from the original; -1: no promise
+  uint64_t unique_bricks = 0;      ///< of the volume that was compressed
+  std::optional<Seeding> seeding;  ///< of k-means; nothing without
+  uint32_t iterations = 0;         ///< of k-means
+  int offset_bits = 0;             ///< of the widest entries of the offset volume
   uint64_t offset_bytes = 0, codebook_bytes = 0;  ///< of the chunks; tables of addresses count as offsets
 };
 
@@ -64,6 +79,7 @@ struct Report {
   uint64_t bricks = 0;                            ///< of the volume
   std::array<uint64_t, 4> transform_codewords{};  ///< codewords by transform; constant bricks have none
   double quantisation_error = 0;  ///< greatest error so far, before k-means, of finite samples
+  double seeding_seconds = 0, kmeans_seconds = 0;
 };
 
 /// Whether the options go together and with a volume: ErrorCode::usage says which do not, ErrorCode::input
@@ -76,8 +92,8 @@ Result<double> error_bound(const Options& options, const VolumeInfo& info);
 
 /// Compresses `source` into a container written to `sink`, in one pass over the source. Not a number, and
 /// minus infinity, are encoded as the least value of a FLOAT32 volume, plus infinity as the greatest. Memory:
-/// the codebook, compressed, and 4 bytes for each brick; with k-means the unique bricks as well. What is
-/// written does not depend on ctx.threads.
+/// the codebook, compressed, and 4 bytes for each brick; with k-means, what that takes for the unique bricks
+/// as well. What is written does not depend on ctx.threads.
 Result<Report> encode(VolumeSource& source, const Options& options, const ByteSink& sink, Context& ctx);
 
 /// A compressed volume, opened for random access. Safe on any bytes: every operation returns an error or a

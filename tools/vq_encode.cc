@@ -20,6 +20,9 @@ struct Options {
   bool lossless = false;
   std::string codebook = "rbuc", offsets = "auto";
   std::optional<double> max_error;
+  uint64_t codewords = 0, reduce = 0;
+  std::string seeding;
+  std::optional<uint32_t> max_iterations;
   bool verify = false;
 };
 
@@ -31,6 +34,15 @@ void declare(CommandLine& line, Options& o) {
             o.lossless);
   line.option("--max-error", "E", "No voxel is further than this from the original, in sample values",
               number(o.max_error, 0, std::numeric_limits<double>::max()));
+  line.option("-k,--codewords", "K", "Keep so many different bricks, chosen by k-means",
+              integer(o.codewords, 1, vq::most_codewords));
+  line.option("--reduce", "N", "Keep one of N different bricks", integer(o.reduce, 1, vq::most_codewords));
+  line.option("--seeding", "HOW",
+              "First centres of k-means: furthest: those furthest from all others; d2: at random, by "
+              "squared distance (furthest)",
+              one_of(o.seeding, {"furthest", "d2"}));
+  line.option("--max-iterations", "N", "Of k-means (until nothing changes)",
+              integer(o.max_iterations, 0, 0xfffffffe));
   line.option("--codebook", "BOOK", "rbuc: codewords of variable length; packed: larger, faster (rbuc)",
               one_of(o.codebook, {"rbuc", "packed"}));
   line.option("--offsets", "MAP",
@@ -43,8 +55,16 @@ void declare(CommandLine& line, Options& o) {
 
 Result<vq::Options> encoder_options(const Options& o) {
   vq::Options options;
-  if (o.lossless && o.max_error) return bad_usage("--lossless and --max-error: expected one of them");
+  if (o.lossless + o.max_error.has_value() + (o.codewords > 0) + (o.reduce > 0) > 1)
+    return bad_usage("--lossless, --max-error, --codewords and --reduce: expected one of them");
+  if ((o.max_iterations || !o.seeding.empty()) && o.codewords == 0 && o.reduce == 0)
+    return bad_usage(std::string(o.max_iterations ? "--max-iterations" : "--seeding") +
+                     " is for k-means: expected --codewords or --reduce beside it");
   options.max_error = o.max_error;
+  options.codewords = o.codewords;
+  options.reduce = o.reduce;
+  options.seeding = o.seeding == "d2" ? vq::Seeding::d2 : vq::Seeding::furthest;
+  if (o.max_iterations) options.max_iterations = *o.max_iterations;
   if (o.codebook == "packed") options.codebook = vq::Codebook::packed;
   if (o.offsets == "direct") options.mapping = vq::Mapping::direct;
   if (o.offsets == "indirect") options.mapping = vq::Mapping::indirect;
@@ -66,6 +86,8 @@ Json json_of(const Encoding& encoding, const Run& run, const vq::Report& report)
       static_cast<double>(std::max<uint64_t>(1, std::accumulate(counts.begin(), counts.end(), uint64_t{0})));
   Json shares = Json::array();
   for (const uint64_t count : counts) shares.push(static_cast<double>(count) / all);
+  json.set("iterations", report.params.iterations);
+  json.set("seeding_seconds", report.seeding_seconds).set("kmeans_seconds", report.kmeans_seconds);
   json.set("transform_share", std::move(shares)).set("quantisation_error", report.quantisation_error);
   add_verified(encoding, json);
   return json;
@@ -99,6 +121,10 @@ Result<int> work(const Options& o, Run& run) {
                     name(info.format)));
 
   VOX_TRY(auto out, OutputFile::create(o.output, run.options.force));
+  options.clustering = [&run] { run.stage("k-means"); };
+  options.clustered = [&run](uint32_t iteration, double psnr_db) {
+    run.detail(fmt::format("iteration={} psnr_db={:.4f}", iteration, psnr_db));
+  };
   run.stage("encode");
   const double start = run.seconds();
   VOX_TRY(const vq::Report report,
@@ -138,6 +164,8 @@ int main(int argc, char** argv) {
       argc, argv, "vq-encode", "Compresses a scalar volume as a codebook of 4x4x4 bricks.",
       "  vq-encode head.nii.gz -o head.vqv\n"
       "  vq-encode head.nii.gz -o head.vqv --max-error 2 --verify\n"
+      "  vq-encode head.nii.gz -o head.vqv --reduce 16 --verify\n"
+      "  vq-encode head.nii.gz -o head.vqv --codewords 4096 --codebook packed\n"
       "  vq-encode scan.raw --dims 512,512,361 --type u16 -o - > scan.vqv\n",
       [&](CommandLine& line) { declare(line, options); }, [&](Run& run) { return work(options, run); });
 }

@@ -74,6 +74,10 @@ void Run::stage(const std::string& name) {
   ctx.progress = [progress = progress_.get()](double fraction) { progress->update(fraction); };
 }
 
+void Run::detail(const std::string& text) {
+  if (progress_) progress_->detail(text);
+}
+
 void Run::note(const std::string& line) const {
   if (options.verbose) fmt::print(stderr, "{}: {}\n", tool, line);
 }

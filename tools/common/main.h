@@ -28,6 +28,8 @@ class Run {
 
   /// Begins a stage of work for the progress display, such as "encode".
   void stage(const std::string& name);
+  /// Adds to the progress display of this stage: words such as "iteration=3".
+  void detail(const std::string& text);
   /// A line on standard error, with --verbose only.
   void note(const std::string& line) const;
   /// Seconds since the tool started.

@@ -18,8 +18,18 @@ Progress::~Progress() {
   if (shown_ && mode_ == ProgressMode::automatic) fmt::print(stderr, "\r\033[K");
 }
 
+void Progress::detail(const std::string& text) {
+  detail_ = text;
+  if (mode_ == ProgressMode::plain) {
+    fmt::print(stderr, "stage={} {}\n", stage_, detail_);
+  } else {
+    update(fraction_);
+  }
+}
+
 void Progress::update(double fraction) {
   const auto now = Clock::now();
+  fraction_ = fraction;
   if (mode_ == ProgressMode::plain) {
     // The end is always reported, once; what is before it twice a second.
     const bool end = fraction >= 1;
@@ -31,7 +41,8 @@ void Progress::update(double fraction) {
     if (now - start_ < 1s || (shown_ && now - last_ < 100ms)) return;
     shown_ = true;
     last_ = now;
-    fmt::print(stderr, "\r{} {:3.0f} %\033[K", stage_, 100 * fraction);
+    fmt::print(stderr, "\r{} {:3.0f} %{}{}\033[K", stage_, 100 * fraction, detail_.empty() ? "" : ", ",
+               detail_);
     std::fflush(stderr);
   }
 }

@@ -18,11 +18,14 @@ class Progress {
   Progress& operator=(const Progress&) = delete;
   /// Fraction done, 0..1; from one thread at a time.
   void update(double fraction);
+  /// What else there is to know, such as "iteration=3 psnr_db=41.2", from now on. plain: a line of its own.
+  void detail(const std::string& text);
 
  private:
   using Clock = std::chrono::steady_clock;
   ProgressMode mode_;
-  std::string stage_;
+  std::string stage_, detail_;
+  double fraction_ = 0;
   Clock::time_point start_ = Clock::now(), last_ = start_;
   bool shown_ = false, complete_ = false;
 };

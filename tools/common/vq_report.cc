@@ -15,6 +15,7 @@ Json params_json(const vq::Params& params) {
   Json json = Json::object();
   json.set("codebook", name(params.codebook)).set("bits", params.bits);
   json.set("base", params.base).set("step", params.step).set("max_error", params.max_error);
+  json.set("seeding", !params.seeding ? "none" : *params.seeding == vq::Seeding::d2 ? "d2" : "furthest");
   return json;
 }
 
