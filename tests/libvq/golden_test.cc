@@ -20,8 +20,8 @@ namespace {
 
 using namespace voxkit::vq::test;
 
-constexpr const char* columns = "volume,codebook,offsets,max_error,bytes,xxh64";
-constexpr size_t keys = 4;
+constexpr const char* columns = "volume,codebook,offsets,max_error,k_means,bytes,xxh64";
+constexpr size_t keys = 5;
 
 std::vector<std::string> split(const std::string& text, char separator) {
   std::vector<std::string> parts;
@@ -84,6 +84,10 @@ std::vector<Row> read_table() {
     if (fields[2] != "auto")
       row.options.mapping = fields[2] == "direct" ? Mapping::direct : Mapping::indirect;
     if (fields[3] != "-") row.options.max_error = std::stod(fields[3]);
+    if (const auto words = split(fields[4], ' '); words.size() == 2) {
+      row.options.reduce = std::stoull(words[0]);
+      row.options.seeding = words[1] == "d2" ? Seeding::d2 : Seeding::furthest;
+    }
     for (size_t i = 0; i < keys; ++i) row.key += fields[i] + ",";
     if (fields.size() == keys + 2) row.expected = fields[keys] + "," + fields[keys + 1];
     rows.push_back(row);

@@ -176,10 +176,12 @@ class Tools(ToolCase):
     def test_built_ins(self):
         transforms = set()
         for source in BUILT_INS:
-            for options in LAYOUTS + (("--max-error", "3"),):
+            for options in LAYOUTS + (("--max-error", "3"), ("--reduce", "3"), ("-k", "9", "--seeding", "d2")):
                 with self.subTest(source=source, options=options):
                     file = self.encode(source, *options)
                     info = self.compare(file)
+                    if options[0] == "-k":
+                        self.assertLessEqual(info["codewords"], 9)
                     if options[0] == "--codebook":
                         self.assertEqual(info["params"]["codebook"], "packed")
                     if options[0] == "--offsets":
