@@ -45,7 +45,7 @@ struct Kernels {
   void (*near_box)(const KeyBox& box, int32_t reach, const QueryRows& in, QueryRows& out);
   /// For each of the numbered queries, the bricks of a leaf that it may be near to, one bit each: those where
   /// the squared distance of their keys is less than the two reaches together. `edges`: norms of keys less
-  /// reaches.
+  /// reaches. `masks` has room for one more.
   void (*near_bricks)(const Leaf& leaf, const uint32_t* edges, const QueryKey* queries,
                       const uint32_t* numbers, size_t count, uint32_t* masks);
   /// Squared distances of `brick` from the bricks whose bits are set: out[i] for bit i.

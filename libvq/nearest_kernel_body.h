@@ -61,7 +61,7 @@ VOXKIT_CODE inline void near_bricks(const Leaf& leaf, const uint32_t* edges, con
         sum_a[i] = add(edge, fill(a.edge));
         sum_b[i] = add(edge, fill(b.edge));
       }
-#pragma GCC unroll 16
+#pragma GCC unroll 8  // with 16, g++ holds the leaf in more registers than there are
       for (int j = 0; j < fine_pairs; ++j) {
         const Vector pair_a = fill(a.doubled[j]), pair_b = fill(b.doubled[j]);
         for (int i = 0; i < at_once; ++i) {
@@ -76,7 +76,7 @@ VOXKIT_CODE inline void near_bricks(const Leaf& leaf, const uint32_t* edges, con
       }
     }
     masks[k] = mask_a;
-    if (k + 1 < count) masks[k + 1] = mask_b;
+    masks[k + 1] = mask_b;
   }
 }
 

@@ -85,7 +85,7 @@ void search(const BrickTree& tree, const Kernels& kernels, const Branch& branch,
     }
   std::vector<uint32_t>& masks = space.masks();
   constexpr size_t at_once = 256;  // then reaches are looked at again
-  if (masks.size() < at_once) masks.resize(at_once);
+  masks.resize(at_once + 1);
   std::array<uint64_t, leaf_bricks> distances;
   for (size_t begin = 0; begin < near.size; begin += at_once) {
     const size_t count = std::min(at_once, near.size - begin);

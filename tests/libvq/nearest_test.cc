@@ -165,7 +165,7 @@ TEST(Kernels, NearBricksAreThoseWhoseKeysAre) {
         queries.push_back(query_key(query_keys[q], none, query_reaches[q]));
       }
       const std::vector<uint32_t> numbers{8, 0, 1, 2, 3, 5, 7};
-      std::vector<uint32_t> masks(numbers.size(), 5);
+      std::vector<uint32_t> masks(numbers.size() + 1, 5);
       kernels->near_bricks(leaf, edges.data(), queries.data(), numbers.data(), numbers.size(), masks.data());
       for (size_t k = 0; k < numbers.size(); ++k)
         for (size_t i = 0; i < leaf_bricks; ++i) {
