@@ -1,12 +1,12 @@
 #!/usr/bin/env python3
-"""Prints the results of scripts/demo as a table: demo_table.py RESULT:OPTIONS...
+"""Prints the results of scripts/demo as a table: demo_table.py RESULT:COMMAND...
 
-Reads RESULT.{encode,decode,diff,render}.json; OPTIONS, of svmm-encode, are only printed.
+Reads RESULT.{encode,decode,diff,render}.json; COMMAND is only printed.
 """
 import json
 import sys
 
-COLUMNS = ("volume", "svmm-encode", "MB", "percent", "bits/voxel", "PSNR dB", "greatest error", "encode MB/s",
+COLUMNS = ("volume", "compressed by", "MB", "percent", "bits/voxel", "PSNR dB", "greatest error", "encode MB/s",
            "decode Mvoxel/s", "ms a frame", "original's", "picture's dB", "MS-SSIM")
 
 
@@ -16,10 +16,10 @@ def load(result, step):
 
 
 def row(argument):
-    result, options = argument.split(":", 1)
+    result, command = argument.split(":", 1)
     encode, decode, diff, render = (load(result, step) for step in ("encode", "decode", "diff", "render"))
     x, y, z = encode["dims"]
-    return (encode["input"].removesuffix(".nrrd"), options, f"{encode['file_bytes'] / 1e6:.2f}",
+    return (encode["input"].removesuffix(".nrrd"), command, f"{encode['file_bytes'] / 1e6:.2f}",
             f"{encode['percent']:.1f}", f"{encode['bits_per_voxel']:.2f}", f"{float(diff['psnr_db']):.2f}",
             f"{diff['max_abs_error']:g}", f"{encode['input_mb_per_s']:.0f}",
             f"{x * y * z / 1e6 / decode['decode_seconds']:.0f}", f"{render['ms_min']:.0f}",
