@@ -1,0 +1,44 @@
+// Coloured surfaces: voxels in space, each with one colour, from wherever they come.
+#pragma once
+
+#include <cstdint>
+#include <functional>
+#include <span>
+
+#include "formats/context.h"
+#include "formats/volume.h"
+
+namespace voxkit::color {
+
+/// A colour as it is stored and compared: sRGB, 8 bits a channel.
+struct Rgb {
+  uint8_t r = 0, g = 0, b = 0;
+  friend bool operator==(const Rgb&, const Rgb&) = default;
+};
+
+/// A voxel of a surface. `place` is its Morton code: bit 3i is bit i of x, bit 3i + 1 that of y, bit 3i + 2 that
+/// of z, so a side has at most 2^21 voxels.
+struct SurfaceVoxel {
+  uint64_t place = 0;
+  Rgb color;
+};
+inline constexpr int most_levels = 21;
+
+/// A coloured surface that is read once, in Morton order, in bounded memory.
+class SurfaceSource {
+ public:
+  virtual ~SurfaceSource() = default;
+
+  /// Extents and place in space; the format is rgba32, no side is above 2^21.
+  const VolumeInfo& info() const { return info_; }
+
+  using Sink = std::function<Status(std::span<const SurfaceVoxel>)>;
+  /// Calls `sink`, from one thread at a time, with runs of voxels. Places ascend strictly, within a run and from
+  /// run to run: each voxel comes once. Uses ctx.threads threads; what comes does not depend on them.
+  virtual Status read(Context& ctx, const Sink& sink) = 0;
+
+ protected:
+  VolumeInfo info_;
+};
+
+}  // namespace voxkit::color
