@@ -16,8 +16,8 @@ struct Rgb {
   friend bool operator==(const Rgb&, const Rgb&) = default;
 };
 
-/// A voxel of a surface. `place` is its Morton code: bit 3i is bit i of x, bit 3i + 1 that of y, bit 3i + 2 that
-/// of z, so a side has at most 2^21 voxels.
+/// A voxel of a surface. `place` is its Morton code: bit 3i is bit i of x, bit 3i + 1 that of y, bit 3i + 2
+/// that of z, so a side has at most 2^21 voxels.
 struct SurfaceVoxel {
   uint64_t place = 0;
   Rgb color;
@@ -33,8 +33,8 @@ class SurfaceSource {
   const VolumeInfo& info() const { return info_; }
 
   using Sink = std::function<Status(std::span<const SurfaceVoxel>)>;
-  /// Calls `sink`, from one thread at a time, with runs of voxels. Places ascend strictly, within a run and from
-  /// run to run: each voxel comes once. Uses ctx.threads threads; what comes does not depend on them.
+  /// Calls `sink`, from one thread at a time, with runs of voxels. Places ascend strictly, within a run and
+  /// from run to run: each voxel comes once. Uses ctx.threads threads; what comes does not depend on them.
   virtual Status read(Context& ctx, const Sink& sink) = 0;
 
  protected:

@@ -4,7 +4,7 @@
 #include <algorithm>
 
 #include "formats/parallel.h"
-#include "libvq/reservation.h"
+#include "formats/reservation.h"
 #include "libvq/store.h"
 
 namespace voxkit::vq {

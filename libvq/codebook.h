@@ -5,7 +5,7 @@
 #include <vector>
 
 #include "libvq/rbuc.h"
-#include "libvq/reservation.h"
+#include "formats/reservation.h"
 #include "libvq/vq.h"
 
 namespace voxkit::vq {

@@ -5,7 +5,7 @@
 
 #include "formats/context.h"
 
-namespace voxkit::vq {
+namespace voxkit {
 
 /// Memory that counts against the budget; given back at the end.
 class Reservation {
@@ -34,4 +34,4 @@ class Reservation {
   uint64_t bytes_ = 0;
 };
 
-}  // namespace voxkit::vq
+}  // namespace voxkit

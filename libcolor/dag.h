@@ -1,0 +1,85 @@
+// The geometry of a coloured surface: a sparse voxel octree whose equal subtrees are stored once, and which
+// knows for every voxel where its colour is. Source: D. Dolonius et al., "Compressing Color Data for
+// Voxelized Surface Geometry", TVCG 2019, section 3. File: formats/FORMAT.md, section 4.
+//
+// A grid of 2^h voxels a side is a node of height h. Height 2 is a leaf: one 64 bit word, in which bit i is
+// the voxel with the Morton code i. Above, a node is a run of 32 bit words:
+//
+//   word 0        bits 0 to 7: which octants there are, by their Morton number; bits 8 to 31: how many
+//   colours
+//                 there are below, or `wide_count`
+//   1 .. n        a pointer for each of the n octants: the number of a leaf, or of the first word of a node
+//   among
+//                 those of its height
+//   n + 1, n + 2  with `wide_count` only: the number of colours, 64 bits
+//
+// With Counts::pointer, which is Dado's variant, the count is zero and there is, after each pointer, how many
+// colours of this node come before the octant's.
+//
+// Colours are in the order of a walk, depth first. With Colors::all, each node, leaf word and octant of a
+// leaf word has a colour as well, before those below it.
+#pragma once
+
+#include <array>
+#include <bit>
+#include <cstdint>
+#include <span>
+#include <vector>
+
+#include "formats/hd.h"
+
+namespace voxkit::color {
+
+/// What has a colour. Numbers are part of FORMAT.md.
+enum class Colors : uint8_t {
+  leaf = 1,  ///< voxels
+  all = 2,   ///< nodes and voxels
+};
+/// Where counts of colours are.
+enum class Counts : uint8_t {
+  node = 1,     ///< in nodes: small
+  pointer = 2,  ///< beside pointers: fewer words to read on the way
+};
+
+inline constexpr int leaf_height = 2;
+inline constexpr uint32_t wide_count = 0xffffff;
+
+/// Octants of a leaf word that hold voxels, as a mask.
+VOX_HD constexpr uint32_t leaf_octants(uint64_t leaf) {
+  uint32_t mask = 0;
+  for (int i = 0; i < 8; ++i) mask |= (leaf >> 8 * i & 0xff) != 0 ? 1u << i : 0;
+  return mask;
+}
+/// How many colours a leaf word has.
+VOX_HD constexpr uint32_t leaf_colors(uint64_t leaf, Colors colors) {
+  const auto voxels = static_cast<uint32_t>(std::popcount(leaf));
+  if (colors == Colors::leaf) return voxels;
+  return voxels + 1 + static_cast<uint32_t>(std::popcount(leaf_octants(leaf)));
+}
+/// The number, among the colours of a leaf word, of that of voxel `bit`, which is there.
+VOX_HD constexpr uint32_t leaf_index(uint64_t leaf, uint32_t bit, Colors colors) {
+  const auto before = static_cast<uint32_t>(std::popcount(leaf & ((uint64_t{1} << bit) - 1)));
+  if (colors == Colors::leaf) return before;
+  const uint32_t octants = leaf_octants(leaf) & ((2u << (bit >> 3)) - 1);
+  return before + 1 + static_cast<uint32_t>(std::popcount(octants));
+}
+
+/// Words of a node with `octants` children.
+VOX_HD constexpr uint32_t node_words(uint32_t octants, bool wide, Counts counts) {
+  if (counts == Counts::pointer) return 1 + 2 * octants;
+  return 1 + octants + (wide ? 2 : 0);
+}
+
+/// A DAG in memory.
+struct Dag {
+  int height = leaf_height;  ///< the side is 2^height voxels; of the root
+  Colors colors = Colors::leaf;
+  Counts counts = Counts::node;
+  std::vector<uint64_t> leaves;
+  std::vector<std::vector<uint32_t>> nodes;  ///< by height; the first ones, below 3, have none
+  uint32_t root = 0;                         ///< the number of the root among those of its height
+  uint64_t voxels = 0, color_count = 0;
+  uint64_t node_count = 0;  ///< nodes, leaves not counted
+};
+
+}  // namespace voxkit::color

@@ -1,0 +1,120 @@
+// Reading a DAG, wherever its words are: in memory, in a mapped file, on a device. Safe on any words: a
+// pointer that leads outside is never followed.
+#pragma once
+
+#include <array>
+#include <bit>
+#include <cstdint>
+
+#include "formats/hd.h"
+#include "libcolor/dag.h"
+#include "libcolor/surface.h"
+
+namespace voxkit::color {
+
+/// A node that has been looked up.
+struct NodeRef {
+  const uint32_t* words = nullptr;  ///< null: there is none
+  uint32_t mask = 0;
+
+  VOX_HD bool has(uint32_t octant) const { return mask >> octant & 1; }
+  /// Which of the children an octant is.
+  VOX_HD uint32_t number(uint32_t octant) const {
+    return static_cast<uint32_t>(std::popcount(mask & ((1u << octant) - 1)));
+  }
+};
+
+/// A child on the way down.
+struct ChildRef {
+  uint32_t pointer = 0;
+  uint64_t colors_before = 0;  ///< of the node's, before the child's first one
+};
+
+struct DagView {
+  int height = leaf_height;
+  Colors colors = Colors::leaf;
+  Counts counts = Counts::node;
+  uint32_t root = 0;
+  const uint64_t* leaves = nullptr;
+  uint64_t leaf_count = 0;
+  std::array<const uint32_t*, most_levels + 1> nodes{};  ///< by height
+  std::array<uint64_t, most_levels + 1> words{};
+
+  /// The leaf word with this number; 0 if there is none.
+  VOX_HD uint64_t leaf(uint32_t pointer) const { return pointer < leaf_count ? leaves[pointer] : 0; }
+
+  /// The node of this height, above leaf_height, that begins at a word.
+  VOX_HD NodeRef node(int h, uint32_t pointer) const {
+    const auto at = static_cast<size_t>(h);
+    if (pointer >= words[at]) return {};
+    const uint32_t* const first = nodes[at] + pointer;
+    const uint32_t mask = *first & 0xff;
+    const uint32_t length =
+        node_words(static_cast<uint32_t>(std::popcount(mask)), *first >> 8 == wide_count, counts);
+    if (length > words[at] - pointer) return {};
+    return {first, mask};
+  }
+
+  /// How many colours there are in a subtree of this height.
+  VOX_HD uint64_t colors_below(int h, uint32_t pointer) const {
+    if (h == leaf_height) return leaf_colors(leaf(pointer), colors);
+    const auto at = static_cast<size_t>(h);
+    if (pointer >= words[at]) return 0;
+    const uint32_t* const first = nodes[at] + pointer;
+    const uint32_t count = *first >> 8;
+    if (count != wide_count) return count;
+    const NodeRef ref = node(h, pointer);
+    if (ref.words == nullptr) return 0;
+    const uint32_t* const wide = first + 1 + std::popcount(ref.mask);
+    return wide[0] | static_cast<uint64_t>(wide[1]) << 32;
+  }
+
+  /// The child in an octant that is there, of a node of this height.
+  VOX_HD ChildRef child(const NodeRef& node, int h, uint32_t octant) const {
+    const uint32_t number = node.number(octant);
+    if (counts == Counts::pointer) return {node.words[1 + 2 * number], node.words[2 + 2 * number]};
+    uint64_t before = colors == Colors::all ? 1 : 0;
+    for (uint32_t i = 0; i < number; ++i) before += colors_below(h - 1, node.words[1 + i]);
+    return {node.words[1 + number], before};
+  }
+};
+
+/// A DAG in memory, as a view of it.
+inline DagView view_of(const Dag& dag) {
+  DagView view;
+  view.height = dag.height;
+  view.colors = dag.colors;
+  view.counts = dag.counts;
+  view.root = dag.root;
+  view.leaves = dag.leaves.data();
+  view.leaf_count = dag.leaves.size();
+  for (size_t h = 0; h < dag.nodes.size(); ++h) {
+    view.nodes[h] = dag.nodes[h].data();
+    view.words[h] = dag.nodes[h].size();
+  }
+  return view;
+}
+
+/// Whether there is a voxel at a place, a Morton code inside the grid, and if so which colour it has.
+struct Found {
+  bool there = false;
+  uint64_t color = 0;
+};
+VOX_HD inline Found find_voxel(const DagView& view, uint64_t place) {
+  uint32_t pointer = view.root;
+  uint64_t color = 0;
+  for (int h = view.height; h > leaf_height; --h) {
+    const auto octant = static_cast<uint32_t>(place >> 3 * (h - 1) & 7);
+    const NodeRef node = view.node(h, pointer);
+    if (node.words == nullptr || !node.has(octant)) return {};
+    const ChildRef child = view.child(node, h, octant);
+    pointer = child.pointer;
+    color += child.colors_before;
+  }
+  const auto bit = static_cast<uint32_t>(place & 63);
+  const uint64_t leaf = view.leaf(pointer);
+  if ((leaf >> bit & 1) == 0) return {};
+  return {true, color + leaf_index(leaf, bit, view.colors)};
+}
+
+}  // namespace voxkit::color

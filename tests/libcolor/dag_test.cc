@@ -1,0 +1,177 @@
+// The DAG against a plain octree: the same voxels, and each one's colour where a walk through all of it finds
+// it.
+#include <gtest/gtest.h>
+
+#include <map>
+#include <set>
+
+#include "libcolor/dag_builder.h"
+#include "libcolor/dag_view.h"
+#include "tests/libcolor/scenes.h"
+
+namespace voxkit::color {
+namespace {
+
+Result<Dag> build(const Voxels& voxels, int height, Colors colors, Counts counts, size_t run = 1000) {
+  MemoryBudget memory;
+  Context ctx;
+  ctx.memory = &memory;
+  DagBuilder builder(height, colors, counts, ctx);
+  for (size_t i = 0; i < voxels.size(); i += run)
+    VOX_CHECK(builder.add(std::span(voxels).subspan(i, std::min(run, voxels.size() - i))));
+  return builder.finish();
+}
+
+/// Numbers colours by walking through all cells, level by level downwards, as the paper's definition has it.
+class PlainOrder {
+ public:
+  PlainOrder(const Voxels& voxels, int height, Colors colors) : all_(colors == Colors::all) {
+    for (const SurfaceVoxel& v : voxels)
+      for (int h = 0; h <= height; ++h) cells_.insert({h, v.place >> 3 * h});
+    if (!voxels.empty()) walk(height, 0);
+  }
+  std::map<uint64_t, uint64_t> index;
+  uint64_t count = 0;
+
+ private:
+  void walk(int h, uint64_t cell) {
+    if (h == 0) {
+      index[cell] = count++;
+      return;
+    }
+    if (all_) ++count;
+    for (uint64_t octant = 0; octant < 8; ++octant)
+      if (cells_.count({h - 1, cell << 3 | octant})) walk(h - 1, cell << 3 | octant);
+  }
+  std::set<std::pair<int, uint64_t>> cells_;
+  bool all_;
+};
+
+struct Case {
+  const char* name;
+  int height;
+  Voxels voxels;
+};
+std::vector<Case> cases() {
+  std::vector<Case> all;
+  all.push_back({"nothing", 5, {}});
+  all.push_back({"one voxel", 5, {{0, {}}}});
+  all.push_back({"the last voxel", 5, {{(1u << 15) - 1, {}}}});
+  all.push_back(
+      {"one word", 2, voxels_where(2, [](uint32_t x, uint32_t y, uint32_t z) { return x + y > z; })});
+  all.push_back({"full", 4, voxels_where(4, [](uint32_t, uint32_t, uint32_t) { return true; })});
+  all.push_back({"sphere", 6, sphere_shell(6)});
+  all.push_back(
+      {"plane", 6, voxels_where(6, [](uint32_t x, uint32_t y, uint32_t z) { return x / 2 + y / 3 == z; })});
+  all.push_back({"scattered", 7, scattered(7, 3000, 1)});
+  all.push_back({"scattered far", 21, scattered(21, 3000, 2)});
+  return all;
+}
+
+TEST(Dag, VoxelsAndTheirColorsAreThoseOfTheTree) {
+  for (const Case& c : cases())
+    for (const Colors colors : {Colors::leaf, Colors::all})
+      for (const Counts counts : {Counts::node, Counts::pointer}) {
+        SCOPED_TRACE(c.name);
+        const auto dag = build(c.voxels, c.height, colors, counts);
+        ASSERT_TRUE(dag) << dag.error().what;
+        const PlainOrder order(c.voxels, c.height, colors);
+        EXPECT_EQ(dag->voxels, c.voxels.size());
+        EXPECT_EQ(dag->color_count, order.count);
+        const DagView view = view_of(*dag);
+        for (const auto& [place, index] : order.index) {
+          const Found found = find_voxel(view, place);
+          ASSERT_TRUE(found.there) << place;
+          ASSERT_EQ(found.color, index) << place;
+        }
+        // No other voxels: all places of small grids, neighbours in the large one.
+        const uint64_t end = dag->voxels == 0 ? 64 : uint64_t{1} << 3 * std::min(c.height, 7);
+        for (uint64_t place = 0; place < end; ++place)
+          ASSERT_EQ(find_voxel(view, place).there, order.index.count(place) == 1) << place;
+        for (const SurfaceVoxel& v : c.voxels)
+          if (c.height > 7) {
+            ASSERT_EQ(find_voxel(view, v.place ^ 1).there, order.index.count(v.place ^ 1) == 1);
+          }
+      }
+}
+
+TEST(Dag, EqualSubtreesAreStoredOnce) {
+  const auto dag = build(cases()[4].voxels, 4, Colors::leaf, Counts::node);
+  ASSERT_TRUE(dag);
+  EXPECT_EQ(dag->leaves.size(), 1);
+  EXPECT_EQ(dag->nodes[3].size(), 9);
+  EXPECT_EQ(dag->nodes[4].size(), 9);
+  EXPECT_EQ(dag->node_count, 2);
+}
+
+TEST(Dag, LargeCountsGetWordsOfTheirOwn) {
+  // 2^24 voxels and more: a full cube of 256^3 in a corner, and one voxel elsewhere.
+  MemoryBudget memory;
+  Context ctx;
+  ctx.memory = &memory;
+  DagBuilder builder(9, Colors::leaf, Counts::node, ctx);
+  Voxels run(1 << 16);
+  for (uint64_t first = 0; first < 1 << 24; first += run.size()) {
+    for (size_t i = 0; i < run.size(); ++i) run[i].place = first + i;
+    ASSERT_TRUE(builder.add(run));
+  }
+  const SurfaceVoxel last{(uint64_t{1} << 27) - 1, {}};
+  ASSERT_TRUE(builder.add(std::span(&last, 1)));
+  const auto dag = builder.finish();
+  ASSERT_TRUE(dag);
+  EXPECT_EQ(dag->color_count, (1u << 24) + 1);
+  const DagView view = view_of(*dag);
+  EXPECT_EQ(find_voxel(view, last.place).color, 1u << 24);
+  EXPECT_EQ(find_voxel(view, (1u << 24) - 1).color, (1u << 24) - 1);
+  EXPECT_EQ(view.colors_below(9, dag->root), (1u << 24) + 1);
+  EXPECT_EQ(dag->nodes[8].size(), 11 + 2);
+  EXPECT_EQ(dag->nodes[7].size(), 9 + 2);
+}
+
+TEST(Dag, RunsDoNotMatter) {
+  const Voxels voxels = scattered(10, 5000, 3);
+  const auto a = build(voxels, 10, Colors::all, Counts::node, 1),
+             b = build(voxels, 10, Colors::all, Counts::node, 777);
+  ASSERT_TRUE(a && b);
+  EXPECT_EQ(a->nodes, b->nodes);
+  EXPECT_EQ(a->leaves, b->leaves);
+}
+
+TEST(Dag, VoxelsOutOfOrderAreRefused) {
+  for (const Voxels& voxels : {Voxels{{7, {}}, {7, {}}}, Voxels{{7, {}}, {6, {}}}, Voxels{{1 << 15, {}}}}) {
+    const auto dag = build(voxels, 5, Colors::leaf, Counts::node);
+    ASSERT_FALSE(dag);
+    EXPECT_EQ(dag.error().code, ErrorCode::internal);
+  }
+}
+
+TEST(Dag, MemoryIsLimited) {
+  MemoryBudget memory(1 << 16);
+  Context ctx;
+  ctx.memory = &memory;
+  DagBuilder builder(12, Colors::leaf, Counts::node, ctx);
+  const Status status = builder.add(scattered(12, 20000, 4));
+  ASSERT_FALSE(status);
+  EXPECT_EQ(status.error().code, ErrorCode::limit);
+}
+
+TEST(Dag, DamagedWordsLeadNowhere) {
+  const Voxels voxels = scattered(8, 2000, 5);
+  auto dag = build(voxels, 8, Colors::leaf, Counts::node);
+  ASSERT_TRUE(dag);
+  std::mt19937_64 random(6);
+  for (int round = 0; round < 300; ++round) {
+    Dag damaged = *dag;
+    for (int i = 0; i < 5; ++i) {
+      auto& pool = damaged.nodes[3 + random() % 6];
+      pool[random() % pool.size()] = static_cast<uint32_t>(random() >> random() % 64);
+    }
+    // Exact sizes, so that a sanitizer sees what lies beyond.
+    for (auto& pool : damaged.nodes) pool.shrink_to_fit();
+    const DagView view = view_of(damaged);
+    for (const SurfaceVoxel& v : voxels) (void)find_voxel(view, v.place);
+  }
+}
+
+}  // namespace
+}  // namespace voxkit::color

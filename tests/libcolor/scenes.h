@@ -1,0 +1,59 @@
+// Sets of voxels to test with, in Morton order.
+#pragma once
+
+#include <algorithm>
+#include <cstdint>
+#include <functional>
+#include <random>
+#include <vector>
+
+#include "libcolor/morton.h"
+#include "libcolor/surface.h"
+
+namespace voxkit::color {
+
+using Voxels = std::vector<SurfaceVoxel>;
+
+inline Rgb color_at(uint64_t place) {
+  const auto p = morton_place(place);
+  return {static_cast<uint8_t>(p.x * 5), static_cast<uint8_t>(p.y * 3 + p.x / 7),
+          static_cast<uint8_t>(p.z * 9)};
+}
+
+/// The voxels of a cube of 2^height a side for which `inside` says so.
+inline Voxels voxels_where(int height, const std::function<bool(uint32_t, uint32_t, uint32_t)>& inside) {
+  Voxels voxels;
+  for (uint64_t place = 0; place < uint64_t{1} << 3 * height; ++place) {
+    const auto p = morton_place(place);
+    if (inside(p.x, p.y, p.z)) voxels.push_back({place, color_at(place)});
+  }
+  return voxels;
+}
+
+/// A shell of a sphere that touches all sides.
+inline Voxels sphere_shell(int height) {
+  const int64_t side = int64_t{1} << height;
+  return voxels_where(height, [&](uint32_t x, uint32_t y, uint32_t z) {
+    const auto square = [&](uint32_t v) { return (2 * int64_t{v} + 1 - side) * (2 * int64_t{v} + 1 - side); };
+    const int64_t r = square(x) + square(y) + square(z);
+    return r <= side * side && r > (side - 4) * (side - 4);
+  });
+}
+
+/// Voxels anywhere in a grid, some of them next to each other.
+inline Voxels scattered(int height, size_t count, uint64_t seed) {
+  std::mt19937_64 random(seed);
+  std::vector<uint64_t> places;
+  const uint64_t all = height == most_levels ? ~uint64_t{0} >> 1 : (uint64_t{1} << 3 * height) - 1;
+  while (places.size() < count) {
+    const uint64_t first = random() & all;
+    for (uint64_t i = 0; i < random() % 9; ++i) places.push_back((first + i) & all);
+  }
+  std::sort(places.begin(), places.end());
+  places.erase(std::unique(places.begin(), places.end()), places.end());
+  Voxels voxels;
+  for (const uint64_t place : places) voxels.push_back({place, color_at(place)});
+  return voxels;
+}
+
+}  // namespace voxkit::color
