@@ -1,7 +1,7 @@
 // The inner loops of the search with AVX2 and with AVX-512.
 #pragma once
 
-#include "libvq/cpu.h"
+#include "formats/cpu.h"
 #include "libvq/nearest_kernel.h"
 
 #ifdef VOXKIT_AVX2

@@ -3,7 +3,7 @@
 #include <algorithm>
 #include <bit>
 
-#include "libvq/cpu.h"
+#include "formats/cpu.h"
 #include "libvq/rbuc_avx2.h"
 
 namespace voxkit::vq {

@@ -2,7 +2,7 @@
 #pragma once
 
 #include "libvq/brick.h"
-#include "libvq/cpu.h"
+#include "formats/cpu.h"
 
 #ifdef VOXKIT_AVX2
 

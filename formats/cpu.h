@@ -5,7 +5,7 @@
 #define VOXKIT_AVX2
 #endif
 
-namespace voxkit::vq {
+namespace voxkit {
 
 /// Whether code for AVX2 may run here; false where there is none.
 inline bool has_avx2() {
@@ -16,4 +16,4 @@ inline bool has_avx2() {
 #endif
 }
 
-}  // namespace voxkit::vq
+}  // namespace voxkit

@@ -1,0 +1,138 @@
+#include "libcolor/block_encode.h"
+
+#include <algorithm>
+#include <cmath>
+
+#include "libcolor/block_plan.h"
+
+namespace voxkit::color {
+namespace {
+
+uint32_t to_565(Rgb c) {
+  return c.r >> 3 | static_cast<uint32_t>(c.g >> 2) << 5 | static_cast<uint32_t>(c.b >> 3) << 11;
+}
+
+/// Bits, lowest first.
+class BitWriter {
+ public:
+  void add(uint32_t value, int bits) {
+    pending_ |= uint64_t{value} << count_;
+    for (count_ += bits; count_ >= 8; count_ -= 8, pending_ >>= 8)
+      bytes_.push_back(static_cast<std::byte>(pending_ & 0xff));
+  }
+  void align() {
+    if (count_ > 0) add(0, 8 - count_);
+  }
+  uint64_t size() const { return bytes_.size() * 8 + static_cast<uint64_t>(count_); }
+  const std::vector<std::byte>& bytes() const { return bytes_; }
+
+ private:
+  std::vector<std::byte> bytes_;
+  uint64_t pending_ = 0;
+  int count_ = 0;
+};
+
+/// A part as it grows, macro block by macro block.
+class PartWriter {
+ public:
+  PartWriter(Endpoints endpoints, size_t macro_blocks)
+      : endpoints_(endpoints), heads_(macro_blocks * macro_head) {}
+
+  void add(const Fitter& fitter, const std::vector<PlannedBlock>& plan) {
+    const uint64_t weights = begin_macro_block(0);
+    std::vector<uint8_t> run;
+    for (const PlannedBlock& block : plan) {
+      const uint64_t offset = block.bits == 0 ? no_weights : weights_.size() - weights;
+      const uint32_t bits = block.bits == 0 ? 0 : static_cast<uint32_t>(block.bits - 1);
+      add_header(block.first | bits << 14 | static_cast<uint32_t>(offset) << 16, block);
+      part_.squared_error += block.fit.squared_error;
+      part_.most_squared = std::max(part_.most_squared, block.fit.most_squared);
+      if (block.bits == 0) continue;
+      run.resize(block.last - block.first);
+      fitter.weights(block.fit, block.first, block.last, block.bits, run.data());
+      for (const uint8_t weight : run) weights_.add(weight, block.bits);
+    }
+  }
+  /// A macro block of colours as they are.
+  void add_raw(std::span<const Rgb> colors) {
+    weights_.align();
+    begin_macro_block(raw_macro_block);
+    for (const Rgb c : colors)
+      weights_.add(c.r | static_cast<uint32_t>(c.g) << 8 | static_cast<uint32_t>(c.b) << 16, 24);
+  }
+  EncodedPart finish() {
+    weights_.align();
+    std::vector<std::byte>& bytes = part_.bytes;
+    bytes.resize(part_head);
+    store_le(bytes.data(), static_cast<uint32_t>(part_.blocks));
+    bytes.insert(bytes.end(), heads_.begin(), heads_.end());
+    bytes.insert(bytes.end(), headers_.begin(), headers_.end());
+    bytes.resize((bytes.size() + 7) / 8 * 8);
+    bytes.insert(bytes.end(), weights_.bytes().begin(), weights_.bytes().end());
+    bytes.resize(bytes.size() + part_tail);
+    return std::move(part_);
+  }
+
+ private:
+  uint64_t begin_macro_block(uint64_t flag) {
+    std::byte* const head = &heads_[macro_head * macro_blocks_++];
+    store_le(head, part_.blocks | flag);
+    store_le(head + 8, weights_.size());
+    return weights_.size();
+  }
+  void add_header(uint32_t word, const PlannedBlock& block) {
+    std::array<std::byte, 10> header;
+    store_le(header.data(), word);
+    const Rgb a = block.fit.a, b = block.fit.b;
+    if (endpoints_ == Endpoints::rgb888) {
+      const std::array<uint8_t, 6> ends = {a.r, a.g, a.b, b.r, b.g, b.b};
+      for (size_t i = 0; i < ends.size(); ++i) header[4 + i] = static_cast<std::byte>(ends[i]);
+    } else {
+      store_le(&header[4], block.bits == 0 ? to_single(a) : to_565(a) | to_565(b) << 16);
+    }
+    headers_.insert(headers_.end(), header.begin(), header.begin() + header_bytes(endpoints_));
+    ++part_.blocks;
+  }
+
+  Endpoints endpoints_;
+  EncodedPart part_;
+  std::vector<std::byte> heads_, headers_;
+  BitWriter weights_;
+  size_t macro_blocks_ = 0;
+};
+
+}  // namespace
+
+Endpoints endpoints_for(double threshold) {
+  constexpr double worst_565 = 6.13;
+  return threshold < worst_565 ? Endpoints::rgb888 : Endpoints::rgb565;
+}
+
+EncodedPart encode_part(std::span<const Rgb> colors, const BlockOptions& options) {
+  const Endpoints endpoints = endpoints_for(options.threshold);
+  constexpr double greatest = 442;  // no two colours are further apart
+  const double threshold = std::min(options.threshold, greatest);
+  const auto allowed = static_cast<uint32_t>(threshold * threshold);
+  const size_t macro_blocks = (colors.size() + macro_block_colors - 1) / macro_block_colors;
+  PartWriter writer(endpoints, macro_blocks);
+  for (size_t m = 0; m < macro_blocks; ++m) {
+    const size_t first = m * macro_block_colors;
+    const auto own = colors.subspan(first, std::min<size_t>(macro_block_colors, colors.size() - first));
+    const MacroColors macro(own);
+    const Fitter fitter(macro, endpoints, allowed);
+    const std::vector<PlannedBlock> plan =
+        options.weight_bits > 0
+            ? merge_greedily(macro, fitter, endpoints, options.weight_bits, options.weight_bits)
+            : merge_greedily(macro, fitter, endpoints, 0, most_weight_bits);
+    uint64_t cost = 0;
+    for (const PlannedBlock& block : plan)
+      cost += block_cost(block.last - block.first, block.bits, endpoints);
+    if (cost >= 24 * own.size())
+      writer.add_raw(own);
+    else
+      writer.add(fitter, plan);
+  }
+  return writer.finish();
+}
+
+}  // namespace voxkit::color

@@ -1,0 +1,32 @@
+// From colours to a part of block encoded ones.
+#pragma once
+
+#include <cstddef>
+#include <span>
+#include <vector>
+
+#include "libcolor/block_layout.h"
+
+namespace voxkit::color {
+
+/// What the encoder is asked for.
+struct BlockOptions {
+  double threshold = 9.56;  ///< greatest RGB distance of a decoded colour, 0 or more
+  int weight_bits = 0;      ///< 1 to 4: that many for all blocks (fws); 0: what suits each block (vws)
+  int effort = 1;           ///< 1: the paper's greedy merging; 2 to 9: optimal parsing, ever wider
+};
+
+/// Endpoints with which any colour can be coded within a threshold: 5 and 6 bits are off by up to 6.1.
+Endpoints endpoints_for(double threshold);
+
+struct EncodedPart {
+  std::vector<std::byte> bytes;
+  uint64_t blocks = 0;
+  uint64_t squared_error = 0;  ///< sum of squared RGB distances of decoded colours
+  uint32_t most_squared = 0;   ///< the greatest
+};
+
+/// Encodes 1 to 2^20 colours as a part.
+EncodedPart encode_part(std::span<const Rgb> colors, const BlockOptions& options);
+
+}  // namespace voxkit::color

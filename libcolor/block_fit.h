@@ -1,0 +1,63 @@
+// One block of colours as a line between two of them: the best ends, and how far what is decoded is from what
+// was.
+#pragma once
+
+#include <array>
+#include <cstdint>
+#include <span>
+#include <vector>
+
+#include "libcolor/block_layout.h"
+
+namespace voxkit::color {
+
+/// The colours of a macro block as the encoder works on them.
+class MacroColors {
+ public:
+  /// 1 to 16384 colours.
+  explicit MacroColors(std::span<const Rgb> colors);
+  uint32_t size() const { return size_; }
+  Rgb color(uint32_t i) const;
+
+  /// Sums over colours: r, g, b, rr, gg, bb, rg, rb, gb.
+  using Sums = std::array<uint32_t, 9>;
+  Sums sums(uint32_t first, uint32_t last) const;
+  /// Channel c of all colours, as whole numbers; whole vectors may be read from any of them.
+  const float* channel(size_t c) const { return channels_[c].data(); }
+
+ private:
+  uint32_t size_;
+  std::array<std::vector<float>, 3> channels_;
+  std::vector<Sums> prefix_;
+};
+
+/// What a run of colours is coded as.
+struct Fit {
+  bool feasible = false;       ///< no decoded colour is further than allowed
+  Rgb a, b;                    ///< both ends, as decoded
+  uint32_t most_squared = 0;   ///< greatest squared distance
+  uint64_t squared_error = 0;  ///< sum of squared distances
+};
+
+/// Fits runs of colours.
+class Fitter {
+ public:
+  /// `allowed`: the greatest squared RGB distance that any decoded colour may have.
+  Fitter(const MacroColors& colors, Endpoints endpoints, uint32_t allowed)
+      : colors_(colors), endpoints_(endpoints), allowed_(allowed) {}
+  /// The colours first .. last, half open, with `bits` bits a weight, 0 to 4.
+  Fit fit(uint32_t first, uint32_t last, int bits) const;
+  /// The weights of a fit with at least one bit, in order.
+  void weights(const Fit& fit, uint32_t first, uint32_t last, int bits, uint8_t* out) const;
+
+ private:
+  Fit fit_single(uint32_t first, uint32_t last) const;
+  Fit fit_line(uint32_t first, uint32_t last, int bits) const;
+  Rgb quantised(const std::array<float, 3>& color) const;
+
+  const MacroColors& colors_;
+  Endpoints endpoints_;
+  uint32_t allowed_;
+};
+
+}  // namespace voxkit::color

@@ -1,0 +1,177 @@
+// Block encoded colours: the bound holds, what is decoded is what was planned, on any machine and from any
+// bytes.
+#include <gtest/gtest.h>
+
+#include <cmath>
+
+#include "libcolor/block_encode.h"
+#include "libcolor/block_kernel.h"
+#include "libcolor/block_plan.h"
+#include "tests/libcolor/color_runs.h"
+
+namespace voxkit::color {
+namespace {
+
+uint32_t squared_distance(Rgb a, Rgb b) {
+  const int r = a.r - b.r, g = a.g - b.g, c = a.b - b.b;
+  return static_cast<uint32_t>(r * r + g * g + c * c);
+}
+PartView view_of(const EncodedPart& part, size_t colors, const BlockOptions& options) {
+  return {part.bytes.data(), part.bytes.size(), static_cast<uint32_t>(colors),
+          endpoints_for(options.threshold)};
+}
+
+TEST(Blocks, NoColorIsFurtherThanTheThreshold) {
+  for (const double threshold : {0.0, 0.5, 1.0, 3.0, 6.12, 6.13, 6.38, 9.56, 12.8, 25.5, 64.0, 1000.0})
+    for (const int weight_bits : {0, 1, 3, 4})
+      for (const ColorCase& c : color_cases(3000, 1)) {
+        SCOPED_TRACE(testing::Message() << c.name << ", " << threshold << ", " << weight_bits << " bits");
+        const BlockOptions options{threshold, weight_bits, 1};
+        const EncodedPart part = encode_part(c.colors, options);
+        const PartView view = view_of(part, c.colors.size(), options);
+        ASSERT_TRUE(view.valid());
+        uint64_t sum = 0;
+        uint32_t most = 0;
+        for (size_t i = 0; i < c.colors.size(); ++i) {
+          const uint32_t d = squared_distance(c.colors[i], view.color(static_cast<uint32_t>(i)));
+          sum += d;
+          most = std::max(most, d);
+        }
+        EXPECT_LE(most, threshold * threshold);
+        EXPECT_EQ(sum, part.squared_error);
+        EXPECT_EQ(most, part.most_squared);
+      }
+}
+
+TEST(Blocks, NoiseCostsHardlyMoreThanPlainColors) {
+  for (const size_t size : {size_t{20000}, size_t{100000}}) {
+    const auto noise = color_cases(size, 2)[1].colors;
+    const EncodedPart part = encode_part(noise, {0.5, 0, 1});
+    EXPECT_LE(static_cast<double>(part.bytes.size()), 3.03 * static_cast<double>(size));
+    EXPECT_EQ(part.squared_error, 0u);
+  }
+}
+
+TEST(Blocks, MacroBlocksEndWhereTheyMust) {
+  for (const size_t size : {size_t{3}, size_t{16383}, size_t{16384}, size_t{16385}, size_t{32768}}) {
+    std::vector<Rgb> colors(size, Rgb{17, 99, 200});
+    const BlockOptions options;
+    const EncodedPart part = encode_part(colors, options);
+    const size_t macro_blocks = (size + 16383) / 16384;
+    EXPECT_EQ(part.blocks, macro_blocks);
+    EXPECT_EQ(part.bytes.size(), 8 + 16 * macro_blocks + 8 * macro_blocks + 8);
+    const PartView view = view_of(part, size, options);
+    EXPECT_EQ(view.color(0), colors[0]);
+    EXPECT_EQ(view.color(static_cast<uint32_t>(size - 1)), colors[0]);
+    EXPECT_EQ(view.color(static_cast<uint32_t>(size)), Rgb{});
+  }
+}
+
+TEST(Blocks, AnySingleColorIsExact) {
+  for (uint32_t v = 0; v < 256; ++v) {
+    const Rgb c{static_cast<uint8_t>(v), static_cast<uint8_t>(255 - v), static_cast<uint8_t>(v ^ 0x5a)};
+    EXPECT_EQ(from_single(to_single(c)), c);
+  }
+}
+
+TEST(Blocks, WorstRoundingTo565) {
+  // Of each channel's 256 values, the furthest from those of 5 and of 6 bits.
+  const auto worst = [](int bits) {
+    int furthest = 0;
+    for (int v = 0; v < 256; ++v) {
+      int nearest = 255;
+      for (uint32_t q = 0; q < 1u << bits; ++q)
+        nearest = std::min(nearest, std::abs(v - (bits == 5 ? from_5_bits(q) : from_6_bits(q))));
+      furthest = std::max(furthest, nearest);
+    }
+    return furthest;
+  };
+  EXPECT_LT(std::sqrt(2 * worst(5) * worst(5) + worst(6) * worst(6)), 6.13);
+  EXPECT_EQ(endpoints_for(6.13), Endpoints::rgb565);
+  EXPECT_EQ(endpoints_for(6.12), Endpoints::rgb888);
+}
+
+/// The plain way: every colour against all steps of the line that it may be.
+Distances plain_distances(const std::vector<Rgb>& colors, Rgb a, Rgb b, uint32_t most,
+                          const uint8_t* weights) {
+  Distances d{0, 0};
+  for (size_t i = 0; i < colors.size(); ++i) {
+    const uint32_t own = squared_distance(colors[i], mix(a, b, weights[i], most));
+    d.most = std::max(d.most, own);
+    d.sum += own;
+  }
+  return d;
+}
+
+TEST(Blocks, KernelsAgreeWithEachOtherAndWithThePlainWay) {
+  std::mt19937_64 random(3);
+  const auto color = [&] {
+    return Rgb{static_cast<uint8_t>(random()), static_cast<uint8_t>(random()),
+               static_cast<uint8_t>(random())};
+  };
+  const auto floats = [](Rgb c) {
+    return std::array<float, 3>{static_cast<float>(c.r), static_cast<float>(c.g), static_cast<float>(c.b)};
+  };
+  for (int round = 0; round < 300; ++round) {
+    std::vector<Rgb> colors(1 + random() % 700);
+    const Rgb a = color(), b = random() % 8 == 0 ? a : color();
+    for (Rgb& c : colors)
+      c = random() % 3 == 0 ? color() : mix(a, b, static_cast<uint32_t>(random() % 101), 100);
+    const MacroColors macro(colors);
+    const ColorRun run{{macro.channel(0), macro.channel(1), macro.channel(2)}, macro.size()};
+    const std::array<float, 3> axis = {0.3f, -0.8f, 0.52f};
+    const Extent e1 = block_kernels(true).extent(run, axis), e2 = block_kernels(false).extent(run, axis);
+    EXPECT_EQ(e1.least, e2.least);
+    EXPECT_EQ(e1.most, e2.most);
+    for (int bits = 1; bits <= 4; ++bits) {
+      const uint32_t most = (1u << bits) - 1;
+      std::vector<uint8_t> w1(colors.size() + 8), w2(colors.size() + 8);
+      const auto at = [&](bool native, std::vector<uint8_t>& w) {
+        return block_kernels(native).distances(run, floats(a), floats(b), static_cast<int>(most), 1 << 20,
+                                               w.data());
+      };
+      const Distances d1 = at(true, w1), d2 = at(false, w2);
+      EXPECT_EQ(w1, w2);
+      EXPECT_EQ(d1.most, d2.most);
+      EXPECT_EQ(d1.sum, d2.sum);
+      const Distances plain = plain_distances(colors, a, b, most, w1.data());
+      EXPECT_EQ(d1.most, plain.most);
+      EXPECT_EQ(d1.sum, plain.sum);
+      // No other step is much nearer: they are chosen along the line, before rounding.
+      for (size_t i = 0; i < colors.size(); ++i) {
+        double nearest = 1e9;
+        for (uint32_t w = 0; w <= most; ++w)
+          nearest = std::min(nearest,
+                             std::sqrt(static_cast<double>(squared_distance(colors[i], mix(a, b, w, most)))));
+        EXPECT_LE(std::sqrt(static_cast<double>(squared_distance(colors[i], mix(a, b, w1[i], most)))),
+                  nearest + 1.75);
+      }
+    }
+  }
+}
+
+TEST(Blocks, DamagedPartsAreReadWithoutHarm) {
+  std::mt19937_64 random(4);
+  for (const double threshold : {2.0, 9.56}) {
+    const BlockOptions options{threshold, 0, 1};
+    auto colors = color_cases(40000, 5)[5].colors;
+    const auto noise = color_cases(16384, 6)[1].colors;
+    std::copy(noise.begin(), noise.end(), colors.begin() + 16384);
+    const EncodedPart part = encode_part(colors, options);
+    for (int round = 0; round < 400; ++round) {
+      std::vector<std::byte> bytes = part.bytes;
+      if (round % 2 == 0) bytes.resize(random() % bytes.size());
+      if (!bytes.empty())
+        for (int i = 0; i < 4; ++i)
+          bytes[random() % (round % 3 == 0 ? bytes.size() : std::min<size_t>(bytes.size(), 80))] =
+              static_cast<std::byte>(random());
+      bytes.shrink_to_fit();
+      const PartView view(bytes.data(), bytes.size(), static_cast<uint32_t>(colors.size()),
+                          endpoints_for(threshold));
+      for (uint32_t i = 0; i < colors.size() + 100; i += 37) (void)view.color(i);
+    }
+  }
+}
+
+}  // namespace
+}  // namespace voxkit::color
