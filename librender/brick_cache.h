@@ -48,7 +48,7 @@ class BrickCache {
  public:
   explicit BrickCache(std::unique_ptr<BrickReader<T>> reader)
       : reader_(std::move(reader)),
-        values_(static_cast<size_t>((slots + dvr_lanes) * slot_values)),
+        values_(static_cast<size_t>((slots + PortableLanes::count) * slot_values)),
         places_(slots, -1) {}
   const T* values() const { return values_.data(); }
   const BrickReader<T>& reader() const { return *reader_; }
@@ -61,7 +61,7 @@ class BrickCache {
   int32_t find(int32_t place, uint32_t x, uint32_t y, uint32_t z, int lane, const Ints& held) {
     const auto slot = static_cast<int32_t>(static_cast<uint32_t>(place) * 2654435761u >> (32 - log2_slots));
     if (places_[static_cast<size_t>(slot)] == place) return slot;
-    for (int i = 0; i < dvr_lanes; ++i)
+    for (int i = 0; i < PortableLanes::count; ++i)
       if (i != lane && held[i] == slot) {  // this lane has a slot of its own
         reader_->read(x, y, z, at(slots + lane));
         return slots + lane;

@@ -17,12 +17,13 @@ struct Counts {
 };
 
 /// What a packet found becomes pixels.
-[[gnu::always_inline]] inline void keep(const DvrParams& params, const DvrPixels& found, int x, int y,
+template <class Lanes>
+[[gnu::always_inline]] inline void keep(const DvrParams& params, const DvrPixels<Lanes>& found, int x, int y,
                                         DvrFrame& frame, bool details, Counts& count) {
   const CastParams& cast = params.cast;
   count.bricks += found.bricks;
-  for (int i = 0; i < dvr_lanes; ++i) {
-    const int px = x + i % packet_width, py = y + i / packet_width;
+  for (int i = 0; i < PortableLanes::count; ++i) {
+    const int px = x + i % PortableLanes::width, py = y + i / PortableLanes::width;
     if (px >= cast.right || py >= cast.bottom) continue;
     const auto at = static_cast<size_t>(py) * static_cast<size_t>(cast.width) + static_cast<size_t>(px);
     Pixel pixel;
@@ -33,11 +34,13 @@ struct Counts {
     if (found.hit[i] != 0) {
       const double t = (found.first[i] + params.middle) * params.step;
       pixel.distance = static_cast<float>(t * world_length(cast, px, py));
-      const PixelRay ray = ray_through(cast, px, py);
-      for (int a = 0; a < 3; ++a) {
-        const double v = std::floor(cast.origin[a] + ray.direction[a] * t);
-        const double most = static_cast<double>(cast.dims[a] - 1);
-        detail.voxel[a] = static_cast<int32_t>(v < 0 ? 0 : v > most ? most : v);
+      if (details) {
+        const PixelRay ray = ray_through(cast, px, py);
+        for (int a = 0; a < 3; ++a) {
+          const double v = std::floor(cast.origin[a] + ray.direction[a] * t);
+          const double most = static_cast<double>(cast.dims[a] - 1);
+          detail.voxel[a] = static_cast<int32_t>(v < 0 ? 0 : v > most ? most : v);
+        }
       }
       ++count.hit;
     }
@@ -50,9 +53,9 @@ struct Counts {
 template <class Lanes, DvrGradient kind, class Sampler>
 [[gnu::always_inline]] inline void draw_tile(const DvrParams& params, Sampler& sampler, const Tile& tile,
                                              DvrFrame& frame, bool details, Counts& count) {
-  for (int y = tile.y0; y < tile.y1; y += packet_height)
-    for (int x = tile.x0; x < tile.x1; x += packet_width) {
-      DvrPixels found;
+  for (int y = tile.y0; y < tile.y1; y += PortableLanes::height)
+    for (int x = tile.x0; x < tile.x1; x += PortableLanes::width) {
+      DvrPixels<Lanes> found;
       march<Lanes, Sampler, kind>(params, sampler, x, y, found);
       keep(params, found, x, y, frame, details, count);
     }

@@ -2,7 +2,7 @@
 #pragma once
 
 #include "librender/dvr.h"
-#include "librender/dvr_packet.h"
+#include "librender/dvr_samplers.h"
 
 namespace voxkit::render {
 

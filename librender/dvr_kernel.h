@@ -2,11 +2,11 @@
 // voxels has at a point, how much light it stops, how it is lit (Guthe and Goesele 2016, section 5).
 //
 // Real is float, or a vector of floats: samples side by side. No function compares or branches on samples, so
-// both give the same bits. `Lanes` has least(a, b) and greatest(a, b), which return b if a is NaN, and root.
+// both give the same bits. `Lanes` is OneLane of dvr_lane.h, or has the same for what Real is.
 #pragma once
 
 #include "formats/hd.h"
-#include "librender/dvr_lanes.h"
+#include "librender/dvr_lane.h"
 #include "librender/light.h"
 
 namespace voxkit::render {
@@ -15,30 +15,30 @@ namespace voxkit::render {
 template <class Lanes, class Real>
 VOX_HD_HOT Real exp2_of_density(Real x) {
   x = Lanes::greatest(x, x * 0 - 126.0f);
-  const auto whole = to_int(x - 0.5f);
-  const Real y = (x - to_float(whole)) * 0.693147181f;  // |y| < 0.35
+  const auto whole = Lanes::to_int(x - 0.5f);
+  const Real y = (x - Lanes::to_float(whole)) * 0.693147181f;  // |y| < 0.35
   Real sum = y * (1.0f / 720) + 1.0f / 120;
   sum = sum * y + 1.0f / 24;
   sum = sum * y + 1.0f / 6;
   sum = sum * y + 0.5f;
   sum = sum * y + 1.0f;
   sum = sum * y + 1.0f;
-  return sum * bits_as_float((whole + 127) << 23);
+  return sum * Lanes::bits_as_float((whole + 127) << 23);
 }
 
 /// log2 of 2^-126 <= x <= 1: exactly 0 at 1; absolute error below 2e-6.
-template <class Real>
+template <class Lanes, class Real>
 VOX_HD_HOT Real log2_of_share(const Real& x) {
-  const auto bits = float_as_bits(x);
+  const auto bits = Lanes::float_as_bits(x);
   // The exponent for a mantissa from sqrt(1/2) to sqrt(2).
   const auto exponent = ((bits - 0x3f3504f3) >> 23);
-  const Real m = bits_as_float(bits - (exponent << 23));
+  const Real m = Lanes::bits_as_float(bits - (exponent << 23));
   const Real s = (m - 1.0f) / (m + 1.0f), q = s * s;
   Real sum = q * (1.0f / 9) + 1.0f / 7;
   sum = sum * q + 1.0f / 5;
   sum = sum * q + 1.0f / 3;
   sum = sum * q + 1.0f;
-  return to_float(exponent) + sum * s * 2.88539008f;
+  return Lanes::to_float(exponent) + sum * s * 2.88539008f;
 }
 
 template <class Real>

@@ -79,7 +79,7 @@ void measure(const Function& f, Errors& analytic, Errors& neighbour) {
       way[i] = {static_cast<float>(ways[i].x), static_cast<float>(ways[i].y), static_cast<float>(ways[i].z)};
       difference[i] = sample(f, at + ways[i]).value - here.value;
     }
-    const auto solved = solve_gradient<PortableLanes>(way, difference);
+    const auto solved = solve_gradient<OneLane>(way, difference);
     ASSERT_TRUE(solved.accepted);
     rays.push_back(degrees_between(expected, solved.gradient));
   }
@@ -113,7 +113,7 @@ TEST(DvrGradient, OfALinearFunctionIsExact) {
       way[k] = {unit(random), unit(random), unit(random)};
       difference[k] = dot(way[k], g);
     }
-    const auto solved = solve_gradient<PortableLanes>(way, difference);
+    const auto solved = solve_gradient<OneLane>(way, difference);
     if (!solved.accepted) continue;
     EXPECT_NEAR(solved.gradient.x, g.x, 2e-3);
     EXPECT_NEAR(solved.gradient.y, g.y, 2e-3);
@@ -127,15 +127,15 @@ TEST(DvrGradient, WaysInAPlaneAreRefused) {
       clear{1, 1, 5e-3f};
   for (const auto& last : {none, x, xy, nearly}) {
     const Vec<float> way[3] = {x, y, last};
-    EXPECT_FALSE(solve_gradient<PortableLanes>(way, difference).accepted);
+    EXPECT_FALSE(solve_gradient<OneLane>(way, difference).accepted);
   }
   const Vec<float> good[3] = {x, y, clear};
-  EXPECT_TRUE(solve_gradient<PortableLanes>(good, difference).accepted);
+  EXPECT_TRUE(solve_gradient<OneLane>(good, difference).accepted);
   // Tiny ways, as of a narrow field of view, are as good as long ones.
   const Vec<float> tiny[3] = {{1e-4f, 0, 0}, {0, 1e-4f, 0}, {0, 0, 1e-4f}};
-  EXPECT_TRUE(solve_gradient<PortableLanes>(tiny, difference).accepted);
+  EXPECT_TRUE(solve_gradient<OneLane>(tiny, difference).accepted);
   const Vec<float> odd[3] = {{NAN, 0, 0}, {0, 1, 0}, {0, 0, 1}};
-  EXPECT_FALSE(solve_gradient<PortableLanes>(odd, difference).accepted);
+  EXPECT_FALSE(solve_gradient<OneLane>(odd, difference).accepted);
 }
 
 TEST(DvrGradient, LightIsNeverNegativeNorNoNumber) {
@@ -147,11 +147,11 @@ TEST(DvrGradient, LightIsNeverNegativeNorNoNumber) {
     const Vec<float> gradient{unit(random) * scale, unit(random) * scale,
                               i % 7 == 0 ? 0 : unit(random) * scale};
     const Vec<float> ahead{0, 0, -1}, half{0.35f, 0.37f, 0.86f};
-    const Lit<float> lit = light_sample<PortableLanes>(gradient, light, half, ahead, 1e-6f);
+    const Lit<float> lit = light_sample<OneLane>(gradient, light, half, ahead, 1e-6f);
     ASSERT_TRUE(lit.diffuse >= 0.3f && lit.diffuse <= 1 && lit.specular >= 0 && lit.specular < 0.2f);
     // Which side is lit does not depend on the gradient's sign.
     const Lit<float> other =
-        light_sample<PortableLanes>({-gradient.x, -gradient.y, -gradient.z}, light, half, ahead, 1e-6f);
+        light_sample<OneLane>({-gradient.x, -gradient.y, -gradient.z}, light, half, ahead, 1e-6f);
     if (gradient.z != 0) {
       ASSERT_EQ(lit.diffuse, other.diffuse);
     }
@@ -160,16 +160,16 @@ TEST(DvrGradient, LightIsNeverNegativeNorNoNumber) {
 
 TEST(DvrArithmetic, PowersAndLogarithms) {
   for (double x = 0; x < 120; x += 0.0137) {
-    const auto y = static_cast<double>(exp2_of_density<PortableLanes>(static_cast<float>(-x)));
+    const auto y = static_cast<double>(exp2_of_density<OneLane>(static_cast<float>(-x)));
     ASSERT_NEAR(y / std::exp2(static_cast<double>(static_cast<float>(-x))), 1, 3e-7) << x;
     const float share = static_cast<float>(std::exp2(-x));
-    ASSERT_NEAR(static_cast<double>(log2_of_share(share)), std::log2(static_cast<double>(share)),
+    ASSERT_NEAR(static_cast<double>(log2_of_share<OneLane>(share)), std::log2(static_cast<double>(share)),
                 2e-6 + x * 1e-7)
         << x;
   }
-  EXPECT_EQ(exp2_of_density<PortableLanes>(0.0f), 1);
-  EXPECT_EQ(exp2_of_density<PortableLanes>(-1e30f), 0x1p-126f);
-  EXPECT_EQ(log2_of_share(1.0f), 0);
+  EXPECT_EQ(exp2_of_density<OneLane>(0.0f), 1);
+  EXPECT_EQ(exp2_of_density<OneLane>(-1e30f), 0x1p-126f);
+  EXPECT_EQ(log2_of_share<OneLane>(1.0f), 0);
 }
 
 }  // namespace
