@@ -105,7 +105,7 @@ Result<std::shared_ptr<const Container>> Container::open(std::span<const std::by
   if (version != container_version)
     return bad(fmt::format("header, byte 8: container version {}: expected {}", version, container_version));
   const auto codec = load_le<uint16_t>(header + 10);
-  if (codec < static_cast<uint16_t>(Codec::svmm) || codec > static_cast<uint16_t>(Codec::vq))
+  if (codec < static_cast<uint16_t>(Codec::svmm) || codec > static_cast<uint16_t>(Codec::color))
     return bad(fmt::format("header, byte 10: unknown codec {}", codec));
 
   const uint64_t trailer_offset = bytes.size() - block_size;

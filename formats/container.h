@@ -20,7 +20,7 @@ namespace voxkit {
 inline constexpr std::array<uint8_t, 8> container_magic = {0x89, 'V', 'O', 'X', '\r', '\n', 0x1A, '\n'};
 inline constexpr uint16_t container_version = 1;
 
-enum class Codec : uint16_t { svmm = 1, vq = 2 };
+enum class Codec : uint16_t { svmm = 1, vq = 2, color = 3 };
 
 /// Four letters, as they stand in the file.
 constexpr uint32_t chunk_kind(const char (&letters)[5]) {

@@ -160,8 +160,6 @@ Status DagBuilder::check_memory() {
 
 Result<Dag> DagBuilder::finish() {
   if (dag_.voxels == 0) {
-    dag_.height = leaf_height;
-    dag_.nodes.resize(static_cast<size_t>(leaf_height) + 1);
     dag_.leaves.push_back(0);
     return std::move(dag_);
   }

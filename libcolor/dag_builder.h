@@ -38,7 +38,7 @@ class DagBuilder {
   DagBuilder(int height, Colors colors, Counts counts, Context& ctx);
   /// Appends voxels; places ascend strictly from call to call and are inside the grid (ErrorCode::internal).
   Status add(std::span<const SurfaceVoxel> voxels);
-  /// The DAG; of no voxels it is one leaf word without any. Call it last.
+  /// The DAG; of no voxels it has one leaf word, without any, and no nodes. Call it last.
   Result<Dag> finish();
 
  private:

@@ -1,0 +1,176 @@
+// Verifying a whole file: every checksum, and that everything in it is as FORMAT.md says.
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <bit>
+
+#include "formats/parallel.h"
+#include "formats/reservation.h"
+#include "libcolor/store.h"
+
+namespace voxkit::color {
+namespace {
+
+/// What is below a node.
+struct Below {
+  uint64_t voxels = 0, colors = 0;  ///< no voxels: no node begins here
+};
+
+class Checker {
+ public:
+  Checker(const Volume& volume, const DagView& view, Context& ctx)
+      : volume_(volume), params_(volume.params()), view_(view), ctx_(ctx), reservation_(*ctx.memory) {}
+
+  Status run() {
+    const Container& container = volume_.container();
+    VOX_CHECK(parallel_for(ctx_, static_cast<int64_t>(container.table().size()), [&](int64_t i) -> Status {
+      VOX_CHECK(container.chunk(static_cast<size_t>(i)));
+      return {};
+    }));
+    VOX_CHECK(check_dag());
+    const auto parts = static_cast<int64_t>(part_count(params_.color_count));
+    if (params_.codec == ColorCodec::raw) return {};
+    return parallel_for(ctx_, parts, [&](int64_t part) { return check_part(static_cast<uint64_t>(part)); });
+  }
+
+ private:
+  tl::unexpected<Error> bad(const std::string& what) const {
+    return bad_input(volume_.container().name(), what);
+  }
+
+  Status check_dag() {
+    std::vector<Below> below(view_.leaf_count);
+    VOX_CHECK(reservation_.add(below.size() * sizeof(Below), "counts of voxels"));
+    for (uint64_t i = 0; i < view_.leaf_count; ++i) {
+      const uint64_t leaf = view_.leaves[i];
+      if (leaf == 0 && params_.leaf_voxels > 0) return bad(fmt::format("chunk LEAF, word {}: no voxels", i));
+      below[i] = {static_cast<uint64_t>(std::popcount(leaf)), leaf_colors(leaf, params_.colors)};
+    }
+    for (int h = leaf_height + 1; h <= params_.height; ++h) {
+      VOX_TRY(auto next, check_nodes(h, below));
+      below = std::move(next);
+    }
+    if (params_.leaf_voxels == 0) return {};
+    const Below all = params_.root < below.size() ? below[params_.root] : Below{};
+    if (all.voxels != params_.leaf_voxels || all.colors != params_.color_count)
+      return bad(fmt::format("chunk DAGP: {} voxels and {} colors: below the root there are {} and {}",
+                             params_.leaf_voxels, params_.color_count, all.voxels, all.colors));
+    return check_extents(params_.height, params_.root, Index3(0));
+  }
+
+  /// The nodes of a height, one after the other; what is below each.
+  Result<std::vector<Below>> check_nodes(int h, const std::vector<Below>& children) {
+    const uint64_t words = view_.words[static_cast<size_t>(h)];
+    VOX_CHECK(reservation_.add(words * sizeof(Below), "counts of voxels"));
+    std::vector<Below> below(words);
+    for (uint64_t at = 0; at < words;) {
+      const auto broken = [&](const std::string& rule) {
+        return bad(fmt::format("chunk NODE {}, word {}: {}", h, at, rule));
+      };
+      const NodeRef node = view_.node(h, static_cast<uint32_t>(at));
+      if (node.words == nullptr) return broken("the node ends behind the chunk");
+      if (node.mask == 0) return broken("no octants");
+      Below own{0, params_.colors == Colors::all ? uint64_t{1} : 0};
+      const auto octants = static_cast<uint32_t>(std::popcount(node.mask));
+      const bool beside = params_.counts == Counts::pointer;
+      for (uint32_t i = 0; i < octants; ++i) {
+        const uint32_t pointer = node.words[1 + (beside ? 2 * i : i)];
+        if (pointer >= children.size() || children[pointer].voxels == 0)
+          return broken(fmt::format("pointer {}: nothing begins there", pointer));
+        if (beside && node.words[2 + 2 * i] != own.colors)
+          return broken(
+              fmt::format("{} colors before an octant: expected {}", node.words[2 + 2 * i], own.colors));
+        own.voxels += children[pointer].voxels;
+        own.colors += children[pointer].colors;
+      }
+      const uint32_t count = *node.words >> 8;
+      const bool wide = !beside && own.colors >= wide_count;
+      if (beside ? count != 0
+                 : view_.colors_below(h, static_cast<uint32_t>(at)) != own.colors ||
+                       (count == wide_count) != wide)
+        return broken(fmt::format("a count of {}: expected that of {} colors", count, own.colors));
+      below[at] = own;
+      at += node_words(octants, wide, params_.counts);
+    }
+    return below;
+  }
+
+  /// No voxel is outside the volume: of nodes that reach beyond it, those below.
+  Status check_extents(int h, uint32_t pointer, Index3 corner) const {
+    const Index3 dims = volume_.info().dims, end = corner + (int64_t{1} << h);
+    if (end.x <= dims.x && end.y <= dims.y && end.z <= dims.z) return {};
+    const auto outside = [&] {
+      return bad(fmt::format("a voxel in the cell of {} at {},{},{}: outside the volume", 1 << h, corner.x,
+                             corner.y, corner.z));
+    };
+    if (corner.x >= dims.x || corner.y >= dims.y || corner.z >= dims.z) return outside();
+    if (h == leaf_height) {
+      const uint64_t leaf = view_.leaf(pointer);
+      for (uint64_t left = leaf; left != 0; left &= left - 1) {
+        const auto bit = static_cast<uint32_t>(std::countr_zero(left));
+        const Index3 at = corner + Index3((bit & 1) | (bit >> 2 & 2), (bit >> 1 & 1) | (bit >> 3 & 2),
+                                          (bit >> 2 & 1) | (bit >> 4 & 2));
+        if (at.x >= dims.x || at.y >= dims.y || at.z >= dims.z) return outside();
+      }
+      return {};
+    }
+    const NodeRef node = view_.node(h, pointer);
+    for (uint32_t octant = 0; octant < 8; ++octant) {
+      if (!node.has(octant)) continue;
+      const Index3 at = corner + Index3(octant & 1, octant >> 1 & 1, octant >> 2) * (int64_t{1} << (h - 1));
+      VOX_CHECK(check_extents(h - 1, view_.child(node, h, octant).pointer, at));
+    }
+    return {};
+  }
+
+  Status check_part(uint64_t part) const {
+    const std::byte* const bytes = volume_.store().part(part, volume_.container());
+    if (bytes == nullptr) return volume_.store().status();
+    const uint32_t colors = colors_of_part(params_.color_count, part);
+    const PartView view(bytes, volume_.store().part_bytes(part), colors, params_.endpoints);
+    const auto broken = [&](const std::string& what) {
+      return bad(fmt::format("chunk COLR 0.{}: {}", part, what));
+    };
+    if (!view.valid()) return broken("fewer bytes than its blocks take");
+    uint32_t next = 0;
+    for (uint32_t m = 0; m < view.macro_blocks(); ++m) {
+      const PartView::MacroBlock macro = view.macro_block(m);
+      const uint32_t size = std::min(macro_block_colors, colors - m * macro_block_colors);
+      const auto wrong = [&](const char* what) { return broken(fmt::format("macro block {}: {}", m, what)); };
+      if (macro.first != next || (macro.raw ? macro.last != next : macro.last <= next))
+        return wrong("not its blocks");
+      next = macro.last;
+      if (macro.raw) {
+        if (macro.weights % 8 != 0 || macro.weights + uint64_t{size} * 24 > view.weight_bits())
+          return wrong("colors behind the end");
+        continue;
+      }
+      for (uint32_t b = macro.first; b < macro.last; ++b) {
+        const PartView::Block block = view.block(b);
+        const uint32_t end = b + 1 < macro.last ? view.first_color(b + 1) : size;
+        if (b == macro.first && block.first != 0) return wrong("no block for its first color");
+        if (end <= block.first) return wrong("blocks out of order");
+        if (macro.weights + (block.bits == 0 ? 0 : block.weights) + uint64_t{end - block.first} * block.bits >
+            view.weight_bits())
+          return wrong("weights behind the end");
+      }
+    }
+    if (next != view.blocks()) return broken("blocks of no macro block");
+    return {};
+  }
+
+  const Volume& volume_;
+  const Params& params_;
+  const DagView& view_;
+  Context& ctx_;
+  Reservation reservation_;
+};
+
+}  // namespace
+
+Status Volume::check(Context& ctx) const {
+  VOX_TRY(const DagView* const view, store_->dag(*container_, params_));
+  return Checker(*this, *view, ctx).run();
+}
+
+}  // namespace voxkit::color

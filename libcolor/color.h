@@ -1,0 +1,110 @@
+// Coloured surfaces, compressed: the geometry as a DAG, the colours in an array of their own.
+// Source: D. Dolonius, E. Sintorn, V. Kaempe, U. Assarsson, "Compressing Color Data for Voxelized Surface
+// Geometry", TVCG 2019. File: formats/FORMAT.md, section 4.
+#pragma once
+
+#include <functional>
+#include <memory>
+#include <optional>
+
+#include "formats/container.h"
+#include "formats/context.h"
+#include "formats/source.h"
+#include "libcolor/block_layout.h"
+#include "libcolor/dag.h"
+#include "libcolor/surface.h"
+
+namespace voxkit::color {
+
+class Store;
+
+/// How colours are stored. Numbers are part of FORMAT.md.
+enum class ColorCodec : uint8_t {
+  raw = 1,  ///< 24 bits each
+  fws = 2,  ///< variable bitrate blocks, weights of fixed size (section 4.2)
+  vws = 3,  ///< the same, weights of variable size (section 4.3)
+};
+
+/// What an encoder is asked for.
+struct Options {
+  ColorCodec codec = ColorCodec::vws;
+  double threshold = 9.56;  ///< of fws and vws: greatest distance of a decoded colour, in RGB of 0 to 255
+  int weight_bits = 3;      ///< of fws: 1 to 4
+  int effort = 1;           ///< of fws and vws: 1: the paper's greedy merging; up to 9: smaller, slower
+  Colors colors = Colors::leaf;
+  Counts counts = Counts::node;
+};
+
+/// What a file says about itself.
+struct Params {
+  ColorCodec codec = ColorCodec::vws;
+  Colors colors = Colors::leaf;
+  Counts counts = Counts::node;
+  Endpoints endpoints = Endpoints::rgb565;
+  int height = leaf_height;  ///< the grid is 2^height voxels a side
+  uint32_t root = 0;
+  uint64_t leaf_voxels = 0, color_count = 0;
+  // For the reader's information.
+  int weight_bits = 0;
+  double threshold = 0;
+  double grmse = 0;          ///< root mean square of the errors of all channels of all colours, 0 to 255
+  uint64_t dag_nodes = 0;    ///< leaf words not counted
+  uint64_t dag_bytes = 0;    ///< of nodes and leaf words
+  uint64_t color_bytes = 0;  ///< of all parts
+  uint64_t macro_blocks = 0, blocks = 0;
+};
+
+/// What encoding found out.
+struct Report {
+  Params params;
+  double most_error = 0;  ///< greatest RGB distance of a decoded colour
+  double color_seconds = 0,
+         build_seconds = 0;  ///< of colours; of everything else, reading the source included
+};
+
+/// Whether the options go together: ErrorCode::usage says which do not.
+Status validate(const Options& options);
+
+/// Compresses `source` into a container written to `sink`, in one pass. Memory: the DAG and some parts of
+/// colours; with Colors::all, all colours. What is written does not depend on ctx.threads.
+Result<Report> encode(SurfaceSource& source, const Options& options, const ByteSink& sink, Context& ctx);
+
+/// A compressed surface, opened for random access. Safe on any bytes: every operation returns an error or a
+/// well-formed answer. The DAG is verified when it is first used, colours part by part. Const functions are
+/// thread-safe.
+class Volume {
+ public:
+  static Result<std::shared_ptr<const Volume>> open(std::shared_ptr<const Container> container);
+  ~Volume();
+
+  /// Voxels are rgba32: opaque where there is one, else void.
+  const VolumeInfo& info() const { return info_; }
+  const Params& params() const { return params_; }
+  const Container& container() const { return *container_; }
+  const Store& store() const { return *store_; }
+
+  /// The colour with a number below params().color_count.
+  Result<Rgb> color(uint64_t index) const;
+  /// The colour of the voxel at a place inside the volume; nothing where there is none.
+  Result<std::optional<Rgb>> voxel(Index3 place) const;
+  /// Decodes `box`, inside the volume.
+  Status decode(const Box& box, VoxelSpan out) const;
+  /// Void, where the whole box is known to be that.
+  std::optional<Voxel> uniform(const Box& box) const;
+  /// All voxels in Morton order, in runs.
+  Status for_each_voxel(const SurfaceSource::Sink& sink, Context& ctx) const;
+  /// Verifies every checksum, node, count and block.
+  Status check(Context& ctx) const;
+
+ private:
+  Volume();
+  std::shared_ptr<const Container> container_;
+  VolumeInfo info_;
+  Params params_;
+  std::unique_ptr<Store> store_;
+};
+
+/// A compressed surface as a source of voxels.
+std::unique_ptr<VolumeSource> open_source(std::shared_ptr<const Volume> volume);
+
+}  // namespace voxkit::color

@@ -1,0 +1,156 @@
+// From a surface to a file: the DAG is built while colours are encoded, part by part.
+#include <fmt/format.h>
+
+#include <chrono>
+#include <cmath>
+
+#include "formats/parallel.h"
+#include "formats/reservation.h"
+#include "libcolor/block_encode.h"
+#include "libcolor/dag_builder.h"
+#include "libcolor/layout.h"
+
+namespace voxkit::color {
+namespace {
+
+using Clock = std::chrono::steady_clock;
+
+double seconds_since(Clock::time_point start) {
+  return std::chrono::duration<double>(Clock::now() - start).count();
+}
+
+/// Encodes and writes colours in their order, some parts at a time.
+class ColorWriter {
+ public:
+  ColorWriter(const Options& options, ContainerWriter& container, Context& ctx)
+      : options_(options), container_(container), ctx_(ctx), reservation_(*ctx.memory) {}
+
+  Status begin() {
+    batch_ = static_cast<size_t>(2 * ctx_.threads);
+    constexpr uint64_t part_bytes = uint64_t{part_colors} * (sizeof(Rgb) + 4);  // and what becomes of them
+    VOX_CHECK(reservation_.add(batch_ * part_bytes, "colors that are being encoded"));
+    colors_.reserve(batch_ << part_log2);
+    return {};
+  }
+  Status add(Rgb color) {
+    colors_.push_back(color);
+    return colors_.size() == batch_ << part_log2 ? flush() : Status();
+  }
+  /// Encodes what is left.
+  Status finish() { return flush(); }
+
+  double seconds = 0;
+  uint64_t bytes = 0, blocks = 0, squared_error = 0;
+  uint32_t most_squared = 0;
+
+ private:
+  Status flush() {
+    const auto start = Clock::now();
+    const uint64_t count = part_count(colors_.size());
+    std::vector<EncodedPart> encoded(count);
+    VOX_CHECK(parallel_for(ctx_, static_cast<int64_t>(count), [&](int64_t i) -> Status {
+      const auto part = static_cast<uint64_t>(i);
+      const auto own = std::span(colors_).subspan(part << part_log2, colors_of_part(colors_.size(), part));
+      encoded[part] = encode(own);
+      return {};
+    }));
+    for (const EncodedPart& part : encoded) {
+      VOX_CHECK(container_.add(colors_kind, 0, next_part_++, part.bytes));
+      bytes += part.bytes.size();
+      blocks += part.blocks;
+      squared_error += part.squared_error;
+      most_squared = std::max(most_squared, part.most_squared);
+    }
+    colors_.clear();
+    seconds += seconds_since(start);
+    return {};
+  }
+  EncodedPart encode(std::span<const Rgb> colors) const {
+    if (options_.codec != ColorCodec::raw)
+      return encode_part(colors,
+                         {options_.threshold, options_.codec == ColorCodec::fws ? options_.weight_bits : 0,
+                          options_.effort});
+    EncodedPart part;
+    static_assert(sizeof(Rgb) == 3);
+    const auto raw = std::as_bytes(colors);
+    part.bytes.assign(raw.begin(), raw.end());
+    return part;
+  }
+
+  const Options& options_;
+  ContainerWriter& container_;
+  Context& ctx_;
+  Reservation reservation_;
+  std::vector<Rgb> colors_;
+  size_t batch_ = 0;
+  uint64_t next_part_ = 0;
+};
+
+}  // namespace
+
+Status validate(const Options& o) {
+  if (!(o.threshold >= 0)) return bad_usage(fmt::format("threshold {}: expected 0 or more", o.threshold));
+  if (o.weight_bits < 1 || o.weight_bits > most_weight_bits)
+    return bad_usage(fmt::format("{} bits a weight: expected 1 to {}", o.weight_bits, most_weight_bits));
+  if (o.effort < 1 || o.effort > 9) return bad_usage(fmt::format("effort {}: expected 1 to 9", o.effort));
+  return {};
+}
+
+Result<Report> encode(SurfaceSource& source, const Options& options, const ByteSink& sink, Context& ctx) {
+  VOX_CHECK(validate(options));
+  const auto start = Clock::now();
+  const VolumeInfo& info = source.info();
+  const int height = height_of(info.dims);
+  if (info.format != VoxelFormat::rgba32 || height > most_levels || !checked_voxels(info.dims))
+    return fail(ErrorCode::internal, {}, "not the extents of a surface");
+  ContainerWriter container(sink, Codec::color);
+  VOX_CHECK(container.add(volume_info_kind, 0, 0, pack_volume_info(info)));
+
+  ColorWriter colors(options, container, ctx);
+  VOX_CHECK(colors.begin());
+  DagBuilder builder(height, options.colors, options.counts, ctx);
+  VOX_CHECK(source.read(ctx, [&](std::span<const SurfaceVoxel> run) -> Status {
+    VOX_CHECK(builder.add(run));
+    for (const SurfaceVoxel& voxel : run) VOX_CHECK(colors.add(voxel.color));
+    return {};
+  }));
+  VOX_TRY(const Dag dag, builder.finish());
+  VOX_CHECK(colors.finish());
+
+  Report report;
+  Params& p = report.params;
+  VOX_CHECK(container.add(leaves_kind, 0, 0, std::as_bytes(std::span(dag.leaves))));
+  p.dag_bytes = dag.leaves.size() * sizeof(uint64_t);
+  for (int h = leaf_height + 1; h <= height; ++h) {
+    const auto& nodes = dag.nodes[static_cast<size_t>(h)];
+    VOX_CHECK(container.add(nodes_kind, static_cast<uint32_t>(h), 0, std::as_bytes(std::span(nodes))));
+    p.dag_bytes += nodes.size() * sizeof(uint32_t);
+  }
+  p.codec = options.codec;
+  p.colors = options.colors;
+  p.counts = options.counts;
+  p.height = height;
+  p.root = dag.root;
+  p.leaf_voxels = dag.voxels;
+  p.color_count = dag.color_count;
+  p.dag_nodes = dag.node_count;
+  p.color_bytes = colors.bytes;
+  p.blocks = colors.blocks;
+  if (options.codec != ColorCodec::raw) {
+    p.endpoints = endpoints_for(options.threshold);
+    p.threshold = options.threshold;
+    p.weight_bits = options.codec == ColorCodec::fws ? options.weight_bits : 0;
+    p.macro_blocks = (dag.color_count + macro_block_colors - 1) / macro_block_colors;
+  }
+  if (dag.color_count > 0)
+    p.grmse =
+        std::sqrt(static_cast<double>(colors.squared_error) / (3 * static_cast<double>(dag.color_count)));
+  report.most_error = std::sqrt(static_cast<double>(colors.most_squared));
+  VOX_CHECK(container.add(params_kind, 0, 0, pack_params(p)));
+  VOX_CHECK(container.finish());
+  report.color_seconds = colors.seconds;
+  report.build_seconds = seconds_since(start) - colors.seconds;
+  return report;
+}
+
+}  // namespace voxkit::color

@@ -1,0 +1,93 @@
+#include "libcolor/layout.h"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <bit>
+
+namespace voxkit::color {
+namespace {
+
+constexpr size_t params_bytes = 128;
+
+}  // namespace
+
+int height_of(Index3 dims) {
+  const auto longest = static_cast<uint64_t>(std::max({dims.x, dims.y, dims.z}));
+  return std::max(leaf_height, static_cast<int>(std::bit_width(longest - 1)));
+}
+
+std::vector<std::byte> pack_params(const Params& p) {
+  std::vector<std::byte> bytes(params_bytes);
+  bytes[0] = static_cast<std::byte>(p.codec);
+  bytes[1] = static_cast<std::byte>(p.colors);
+  bytes[2] = static_cast<std::byte>(p.counts);
+  bytes[3] = static_cast<std::byte>(p.endpoints);
+  bytes[4] = static_cast<std::byte>(p.height);
+  bytes[5] = static_cast<std::byte>(p.weight_bits);
+  store_le(&bytes[8], p.leaf_voxels);
+  store_le(&bytes[16], p.color_count);
+  store_le(&bytes[24], p.root);
+  store_le(&bytes[32], p.threshold);
+  store_le(&bytes[40], p.grmse);
+  store_le(&bytes[48], p.dag_nodes);
+  store_le(&bytes[56], p.dag_bytes);
+  store_le(&bytes[64], p.color_bytes);
+  store_le(&bytes[72], p.macro_blocks);
+  store_le(&bytes[80], p.blocks);
+  return bytes;
+}
+
+Result<Params> unpack_params(std::span<const std::byte> bytes, const VolumeInfo& info,
+                             const std::string& file) {
+  const auto bad = [&](size_t at, const std::string& what) {
+    return bad_input(file, fmt::format("chunk DAGP, byte {}: {}", at, what));
+  };
+  if (bytes.size() != params_bytes) return bad(bytes.size(), "ends here: expected 128 bytes");
+  if (info.format != VoxelFormat::rgba32)
+    return bad_input(file,
+                     fmt::format("chunk VOLI, byte 24: voxel format {}: expected RGBA32", name(info.format)));
+  const auto field = [&](size_t at) { return std::to_integer<int>(bytes[at]); };
+  const auto number = [&](size_t at) { return load_le<uint64_t>(&bytes[at]); };
+  const auto is_one_of = [&](size_t at, int most, const char* what) -> Status {
+    if (field(at) >= 1 && field(at) <= most) return {};
+    return bad(at, fmt::format("unknown {} {}", what, field(at)));
+  };
+  VOX_CHECK(is_one_of(0, 3, "color codec"));
+  VOX_CHECK(is_one_of(1, 2, "choice of colors"));
+  VOX_CHECK(is_one_of(2, 2, "place of counts"));
+  VOX_CHECK(is_one_of(3, 2, "kind of endpoints"));
+  Params p;
+  p.codec = static_cast<ColorCodec>(field(0));
+  p.colors = static_cast<Colors>(field(1));
+  p.counts = static_cast<Counts>(field(2));
+  p.endpoints = static_cast<Endpoints>(field(3));
+  p.height = field(4);
+  p.weight_bits = field(5);
+  p.leaf_voxels = number(8);
+  p.color_count = number(16);
+  p.root = load_le<uint32_t>(&bytes[24]);
+  p.threshold = load_le<double>(&bytes[32]);
+  p.grmse = load_le<double>(&bytes[40]);
+  p.dag_nodes = number(48);
+  p.dag_bytes = number(56);
+  p.color_bytes = number(64);
+  p.macro_blocks = number(72);
+  p.blocks = number(80);
+  const int expected = height_of(info.dims);
+  if (expected > most_levels)
+    return bad_input(file, fmt::format("chunk VOLI, byte 0: a side above {}", 1 << most_levels));
+  if (p.height != expected) return bad(4, fmt::format("height {}: expected {}", p.height, expected));
+  const uint64_t voxels = *checked_voxels(info.dims);
+  if (p.leaf_voxels > voxels)
+    return bad(8, fmt::format("{} voxels: expected at most {}", p.leaf_voxels, voxels));
+  // A voxel has at most one node of each height above it.
+  const uint64_t most =
+      p.colors == Colors::leaf ? p.leaf_voxels : p.leaf_voxels * static_cast<uint64_t>(p.height + 1);
+  if (p.color_count < p.leaf_voxels || p.color_count > most)
+    return bad(16, fmt::format("{} colors of {} voxels: expected {} to {}", p.color_count, p.leaf_voxels,
+                               p.leaf_voxels, most));
+  return p;
+}
+
+}  // namespace voxkit::color

@@ -1,0 +1,34 @@
+// The chunks of a file of coloured surfaces (FORMAT.md, section 4): kinds, parameters, sizes.
+#pragma once
+
+#include <span>
+#include <string>
+#include <vector>
+
+#include "libcolor/color.h"
+
+namespace voxkit::color {
+
+inline constexpr uint32_t params_kind = chunk_kind("DAGP");
+inline constexpr uint32_t leaves_kind = chunk_kind("LEAF");
+inline constexpr uint32_t nodes_kind = chunk_kind("NODE");  ///< index: the height
+inline constexpr uint32_t colors_kind = chunk_kind("COLR");
+
+/// Height of the smallest grid that holds a volume.
+int height_of(Index3 dims);
+inline uint64_t part_count(uint64_t colors) {
+  return (colors >> part_log2) + ((colors & (part_colors - 1)) != 0);
+}
+/// Colours of a part.
+inline uint32_t colors_of_part(uint64_t colors, uint64_t part) {
+  const uint64_t left = colors - (part << part_log2);
+  return static_cast<uint32_t>(left < part_colors ? left : part_colors);
+}
+
+/// The chunk 'DAGP'.
+std::vector<std::byte> pack_params(const Params& params);
+/// Its contents, each field as FORMAT.md allows it for this volume.
+Result<Params> unpack_params(std::span<const std::byte> bytes, const VolumeInfo& info,
+                             const std::string& file);
+
+}  // namespace voxkit::color

@@ -1,0 +1,82 @@
+// Where the chunks of an opened file are, verified when first used.
+#pragma once
+
+#include <atomic>
+#include <memory>
+#include <mutex>
+#include <vector>
+
+#include "libcolor/dag_view.h"
+#include "libcolor/layout.h"
+
+namespace voxkit::color {
+
+class Store {
+ public:
+  /// Finds the chunks that follow from the parameters, and no others.
+  Status find_chunks(const Container& container, const Params& params);
+  /// The DAG, all of which is verified now.
+  Result<const DagView*> dag(const Container& container, const Params& params) const;
+  /// The bytes of a part of the colours; null if it is damaged, which `status` then tells.
+  const std::byte* part(uint64_t number, const Container& container) const {
+    const std::byte* const data = found_[number].load(std::memory_order_acquire);
+    return data != nullptr ? data : verify(number, container);
+  }
+  uint64_t part_bytes(uint64_t number) const { return sizes_[number]; }
+  /// The first damaged part that was met.
+  Status status() const;
+
+ private:
+  [[gnu::cold]] const std::byte* verify(uint64_t number, const Container& container) const;
+
+  size_t leaves_ = 0;          ///< index into the container's table
+  std::vector<size_t> nodes_;  ///< by height, from 3 on
+  std::vector<size_t> parts_;
+  std::vector<uint64_t> sizes_;  ///< of parts
+  std::unique_ptr<std::atomic<const std::byte*>[]> found_;
+  mutable std::mutex mutex_;
+  mutable std::optional<DagView> view_;
+  mutable std::atomic<const DagView*> ready_{nullptr};
+  mutable Status status_;
+};
+
+/// Colours of an opened file, one after the other or in any order; one for each thread. Errors are the
+/// store's.
+class ColorReader {
+ public:
+  ColorReader(const Store& store, const Container& container, const Params& params)
+      : store_(store), container_(container), params_(params) {}
+  /// Black where there is no such colour, or it is damaged.
+  Rgb color(uint64_t index) {
+    if (index >= params_.color_count) return {};
+    const uint64_t part = index >> part_log2;
+    if (part != part_ && !open(part)) return {};
+    const auto within = static_cast<uint32_t>(index & (part_colors - 1));
+    if (params_.codec == ColorCodec::raw) {
+      const std::byte* const p = bytes_ + uint64_t{within} * 3;
+      return {static_cast<uint8_t>(p[0]), static_cast<uint8_t>(p[1]), static_cast<uint8_t>(p[2])};
+    }
+    if (within < first_ || within >= last_) find(within);
+    if (first_ == last_) return view_.color(within);
+    return view_.color_in(macro_, block_, within % macro_block_colors);
+  }
+  /// Blocks that have been looked up, for those who count.
+  uint64_t blocks_touched() const { return touched_; }
+
+ private:
+  bool open(uint64_t part);
+  void find(uint32_t within);
+
+  const Store& store_;
+  const Container& container_;
+  const Params& params_;
+  uint64_t part_ = ~uint64_t{0};
+  const std::byte* bytes_ = nullptr;
+  PartView view_;
+  PartView::MacroBlock macro_;
+  PartView::Block block_;
+  uint32_t first_ = 0, last_ = 0;  ///< colours of the part that the block has; none: not of a block
+  uint64_t touched_ = 0;
+};
+
+}  // namespace voxkit::color

@@ -1,0 +1,186 @@
+// Random access to a compressed surface: opening, single voxels, boxes, all voxels.
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <bit>
+
+#include "libcolor/morton.h"
+#include "libcolor/store.h"
+
+namespace voxkit::color {
+namespace {
+
+constexpr int64_t leaf_side = int64_t{1} << leaf_height;
+
+Voxel opaque(Rgb c) {
+  return Voxel::of(static_cast<uint32_t>(c.r | c.g << 8 | c.b << 16) | 0xff000000u);
+}
+Index3 octant_corner(Index3 corner, uint32_t octant, int64_t side) {
+  return corner + Index3(octant & 1, octant >> 1 & 1, octant >> 2) * side;
+}
+
+/// Walks through the nodes that touch a box, depth first, octants in order. `visit` gets leaf words, where
+/// they begin and the number of their first colour, and says whether to go on.
+class BoxWalk {
+ public:
+  BoxWalk(const DagView& view, const Box& box) : view_(view), box_(box) {}
+
+  template <class Visit>
+  bool run(const Visit& visit) const {
+    return node(view_.height, view_.root, Index3(0), 0, visit);
+  }
+
+ private:
+  template <class Visit>
+  bool node(int h, uint32_t pointer, Index3 corner, uint64_t color, const Visit& visit) const {
+    if (h == leaf_height) return visit(view_.leaf(pointer), corner, color);
+    const NodeRef ref = view_.node(h, pointer);
+    if (ref.words == nullptr) return true;
+    const int64_t side = int64_t{1} << (h - 1);
+    uint64_t next = color + (view_.colors == Colors::all ? 1 : 0);
+    for (uint32_t octant = 0; octant < 8; ++octant) {
+      if (!ref.has(octant)) continue;
+      const uint32_t stride = view_.counts == Counts::pointer ? 2 : 1;
+      const uint32_t child = ref.words[1 + stride * ref.number(octant)];
+      const Index3 at = octant_corner(corner, octant, side);
+      if (!intersect({at, at + side}, box_).empty() &&
+          !node(h - 1, child, at, color_of(ref, octant, color, next), visit))
+        return false;
+      if (view_.counts == Counts::node) next += view_.colors_below(h - 1, child);
+    }
+    return true;
+  }
+  uint64_t color_of(const NodeRef& ref, uint32_t octant, uint64_t color, uint64_t next) const {
+    return view_.counts == Counts::node ? next : color + ref.words[2 + 2 * ref.number(octant)];
+  }
+
+  const DagView& view_;
+  Box box_;
+};
+
+}  // namespace
+
+Volume::Volume() = default;
+Volume::~Volume() = default;
+
+Result<std::shared_ptr<const Volume>> Volume::open(std::shared_ptr<const Container> container) {
+  const std::string& file = container->name();
+  if (container->codec() != Codec::color) return bad_input(file, "header, byte 10: not a coloured surface");
+  std::shared_ptr<Volume> volume(new Volume);
+  VOX_TRY(const auto info_bytes, container->only_chunk(volume_info_kind));
+  VOX_TRY(volume->info_, unpack_volume_info(info_bytes, file));
+  VOX_TRY(const auto params_bytes, container->only_chunk(params_kind));
+  VOX_TRY(volume->params_, unpack_params(params_bytes, volume->info_, file));
+  volume->store_ = std::make_unique<Store>();
+  VOX_CHECK(volume->store_->find_chunks(*container, volume->params_));
+  volume->container_ = std::move(container);
+  return volume;
+}
+
+Result<Rgb> Volume::color(uint64_t index) const {
+  if (index >= params_.color_count) return fail(ErrorCode::internal, container_->name(), "no such color");
+  ColorReader reader(*store_, *container_, params_);
+  const Rgb color = reader.color(index);
+  VOX_CHECK(store_->status());
+  return color;
+}
+
+Result<std::optional<Rgb>> Volume::voxel(Index3 place) const {
+  if (!info_.box().contains(place))
+    return fail(ErrorCode::internal, container_->name(), "voxel outside the volume");
+  VOX_TRY(const DagView* const view, store_->dag(*container_, params_));
+  const Found found =
+      find_voxel(*view, morton_code(static_cast<uint32_t>(place.x), static_cast<uint32_t>(place.y),
+                                    static_cast<uint32_t>(place.z)));
+  if (!found.there) return std::optional<Rgb>();
+  if (found.color >= params_.color_count)
+    return bad_input(container_->name(),
+                     fmt::format("color {} of a voxel: there are {}", found.color, params_.color_count));
+  VOX_TRY(const Rgb color, this->color(found.color));
+  return std::optional<Rgb>(color);
+}
+
+Status Volume::decode(const Box& box, VoxelSpan out) const {
+  if (box.empty()) return {};
+  if (!info_.box().contains(box))
+    return fail(ErrorCode::internal, container_->name(), "box outside the volume");
+  VOX_TRY(const DagView* const view, store_->dag(*container_, params_));
+  fill(out, box.size(), VoxelFormat::rgba32, {});
+  ColorReader reader(*store_, *container_, params_);
+  BoxWalk(*view, box).run([&](uint64_t leaf, Index3 corner, uint64_t color) {
+    const bool inside = box.contains(Box{corner, corner + leaf_side});
+    for (uint64_t left = leaf; left != 0; left &= left - 1) {
+      const auto bit = static_cast<uint32_t>(std::countr_zero(left));
+      const auto at = morton_place(bit);
+      const Index3 place = corner + Index3(at);
+      if (!inside && !box.contains(place)) continue;
+      const Voxel voxel = opaque(reader.color(color + leaf_index(leaf, bit, view->colors)));
+      const Index3 to = place - box.lo;
+      std::memcpy(out.row(to.y, to.z) + to.x * 4, voxel.bytes.data(), 4);
+    }
+    return true;
+  });
+  return store_->status();
+}
+
+std::optional<Voxel> Volume::uniform(const Box& box) const {
+  const auto view = store_->dag(*container_, params_);
+  if (!view) return std::nullopt;
+  const bool empty = BoxWalk(**view, box).run([&](uint64_t leaf, Index3 corner, uint64_t) {
+    if (box.contains(Box{corner, corner + leaf_side})) return leaf == 0;
+    for (uint64_t left = leaf; left != 0; left &= left - 1)
+      if (box.contains(corner + Index3(morton_place(static_cast<uint64_t>(std::countr_zero(left))))))
+        return false;
+    return true;
+  });
+  return empty ? std::optional(Voxel{}) : std::nullopt;
+}
+
+Status Volume::for_each_voxel(const SurfaceSource::Sink& sink, Context&) const {
+  VOX_TRY(const DagView* const view, store_->dag(*container_, params_));
+  ColorReader reader(*store_, *container_, params_);
+  constexpr size_t run_voxels = 1 << 16;
+  std::vector<SurfaceVoxel> run;
+  run.reserve(run_voxels + 64);
+  Status status;
+  const auto flush = [&] {
+    status = check_interrupt();
+    if (status) status = store_->status();
+    if (status && !run.empty()) status = sink(run);
+    run.clear();
+    return status.has_value();
+  };
+  const bool complete = BoxWalk(*view, info_.box()).run([&](uint64_t leaf, Index3 corner, uint64_t color) {
+    const uint64_t first = morton_code(static_cast<uint32_t>(corner.x), static_cast<uint32_t>(corner.y),
+                                       static_cast<uint32_t>(corner.z));
+    for (uint64_t left = leaf; left != 0; left &= left - 1) {
+      const auto bit = static_cast<uint32_t>(std::countr_zero(left));
+      run.push_back({first | bit, reader.color(color + leaf_index(leaf, bit, view->colors))});
+    }
+    return run.size() < run_voxels || flush();
+  });
+  if (complete) flush();
+  return status;
+}
+
+namespace {
+
+class ColorSource final : public VolumeSource {
+ public:
+  explicit ColorSource(std::shared_ptr<const Volume> volume) : volume_(std::move(volume)) {
+    info_ = volume_->info();
+  }
+  Status read(const Box& box, VoxelSpan out) override { return volume_->decode(box, out); }
+  std::optional<Voxel> uniform(const Box& box) const override { return volume_->uniform(box); }
+
+ private:
+  std::shared_ptr<const Volume> volume_;
+};
+
+}  // namespace
+
+std::unique_ptr<VolumeSource> open_source(std::shared_ptr<const Volume> volume) {
+  return std::make_unique<ColorSource>(std::move(volume));
+}
+
+}  // namespace voxkit::color
