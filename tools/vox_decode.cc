@@ -21,7 +21,7 @@ struct Options {
 };
 
 void declare(CommandLine& line, Options& o) {
-  line.argument("FILE", "Compressed volume (.svmm, .vqv), or -", o.input);
+  line.argument("FILE", "Compressed volume (.svmm, .vqv, .dagc), or -", o.input);
   line.text("-o,--output", "OUT", "Volume file, pattern such as slice-%04d.tif, or -", o.output, true);
   line.option("--roi", "BOX", "X0,Y0,Z0,X1,Y1,Z1: part of the volume, half open, in voxels of level 0",
               box(o.roi));
@@ -39,7 +39,7 @@ Result<int> work(const Options& o, Run& run) {
   VOX_TRY(Input input, open_compressed(o.input, o.level, run.ctx));
   auto source = std::move(input.source);
   if (o.roi) {
-    const VolumeInfo& whole = input.svmm ? input.svmm->info() : input.vq->info();
+    const VolumeInfo whole = input.svmm ? input.svmm->info() : source->info();
     const Index3 dims = whole.dims;
     if (!whole.box().contains(*o.roi))
       return bad_usage(

@@ -5,6 +5,7 @@
 #include "formats/copy.h"
 #include "formats/open_volume.h"
 #include "formats/readers.h"
+#include "tools/common/color_report.h"
 #include "tools/common/input.h"
 #include "tools/common/json.h"
 #include "tools/common/main.h"
@@ -30,6 +31,7 @@ void declare(CommandLine& line, Options& o) {
 std::string_view format_of(const std::string& file, const Input& input) {
   if (input.svmm) return "svmm";
   if (input.vq) return "vqv";
+  if (input.color) return "dagc";
   if (is_builtin(file)) return "builtin";
   static constexpr std::pair<std::string_view, std::string_view> endings[] = {
       {".nhdr", "nrrd"}, {".nii", "nifti"}, {".nii.gz", "nifti"}, {".raw", "raw"}, {".vdb", "vdb"},
@@ -39,6 +41,9 @@ std::string_view format_of(const std::string& file, const Input& input) {
   return file == "-" ? "nrrd" : "slices";
 }
 
+std::string_view codec_of(const Input& input) {
+  return input.svmm ? "svmm" : input.vq ? "vq" : input.color ? "dagcolor" : "none";
+}
 std::string_view name(SampleType type) {
   constexpr std::string_view names[] = {"",    "u8",  "i8",  "u16", "i16", "u32",
                                         "i32", "u64", "i64", "f32", "f64", "bit"};
@@ -52,14 +57,17 @@ std::string letters(uint32_t kind) {
 
 /// The container of a compressed volume; null for others.
 const Container* container_of(const Input& input) {
-  return input.svmm ? &input.svmm->container() : input.vq ? &input.vq->container() : nullptr;
+  return input.svmm    ? &input.svmm->container()
+         : input.vq    ? &input.vq->container()
+         : input.color ? &input.color->container()
+                       : nullptr;
 }
 
 Json json_of(const Options& o, const Run& run, const Input& input, std::optional<uint64_t> bytes) {
   const VolumeInfo& info = input.source->info();
   Json json = Json::result();
   json.set("tool", run.tool).set("version", version_text()).set("input", o.file);
-  json.set("format", format_of(o.file, input)).set("codec", input.svmm ? "svmm" : input.vq ? "vq" : "none");
+  json.set("format", format_of(o.file, input)).set("codec", codec_of(input));
   json.set("dims", info.dims).set("voxel_format", voxkit::name(info.format));
   if (!is_colour(info.format)) json.set("sample_type", name(info.sample_type));
   json.set("raw_bytes", raw_bytes(info));
@@ -76,9 +84,10 @@ Json json_of(const Options& o, const Run& run, const Input& input, std::optional
   }
   json.set("spacing", std::move(spacing)).set("origin", std::move(origin));
   json.set("slope", info.slope).set("intercept", info.intercept);
-  json.set("params", input.svmm ? params_json(input.svmm->params())
-                     : input.vq ? params_json(input.vq->params())
-                                : Json::object());
+  json.set("params", input.svmm    ? params_json(input.svmm->params())
+                     : input.vq    ? params_json(input.vq->params())
+                     : input.color ? params_json(input.color->params())
+                                   : Json::object());
   Json chunks = Json::array();
   if (const Container* container = container_of(input)) {
     for (const ChunkEntry& entry : container->table()) {
@@ -94,6 +103,7 @@ Json json_of(const Options& o, const Run& run, const Input& input, std::optional
     json.set("levels", levels_json(input.svmm->levels()));
   }
   if (input.vq) add_sizes(input.vq->params(), json);
+  if (input.color) add_sizes(input.color->params(), json);
   if (o.check) json.set("checked", true);
   return json;
 }
@@ -126,6 +136,7 @@ std::string text_of(const Options& o, const Input& input, std::optional<uint64_t
                           l.block_bytes, l.terminal_voxels);
   }
   if (input.vq) text += sizes_text(*input.vq);
+  if (input.color) text += sizes_text(input.color->params());
   if (o.check) text += "check       passed\n";
   return text;
 }
@@ -144,7 +155,9 @@ Result<int> work(const Options& o, Run& run) {
     NullSink sink;
     const Status status = input.svmm ? input.svmm->check(run.ctx)
                           : input.vq ? input.vq->check(run.ctx)
-                                     : copy_volume(*input.source, input.source->info().box(), sink, run.ctx);
+                          : input.color
+                              ? input.color->check(run.ctx)
+                              : copy_volume(*input.source, input.source->info().box(), sink, run.ctx);
     if (!status && status.error().code == ErrorCode::input) {
       // The answer of the check is no: not a failure to give one.
       report(run.tool, status.error());

@@ -35,6 +35,12 @@ Result<Input> open_codec(std::shared_ptr<const Container> container, int level) 
     input.source = vq::open_source(input.vq);
     return input;
   }
+  if (container->codec() == Codec::color) {
+    VOX_CHECK(check_level(1));
+    VOX_TRY(input.color, color::Volume::open(std::move(container)));
+    input.source = color::open_source(input.color);
+    return input;
+  }
   VOX_TRY(input.svmm, svmm::Volume::open(container));
   VOX_CHECK(check_level(static_cast<int>(input.svmm->levels().size())));
   VOX_TRY(input.source, svmm::open_source(input.svmm, level));
@@ -85,7 +91,7 @@ void declare_input_options(CommandLine& line, OpenOptions& options, bool type) {
 }
 
 bool is_compressed(const std::string& name) {
-  return has_ending(name, ".svmm") || has_ending(name, ".vqv");
+  return has_ending(name, ".svmm") || has_ending(name, ".vqv") || has_ending(name, ".dagc");
 }
 
 Result<std::shared_ptr<const Container>> open_container(const std::string& name) {

@@ -7,6 +7,7 @@
 #include <string>
 
 #include "formats/open_volume.h"
+#include "libcolor/color.h"
 #include "libsvmm/svmm.h"
 #include "libvq/vq.h"
 #include "tools/common/command_line.h"
@@ -15,8 +16,9 @@ namespace voxkit::cli {
 
 struct Input {
   std::unique_ptr<VolumeSource> source;
-  std::shared_ptr<const svmm::Volume> svmm;  ///< null for all but .svmm
-  std::shared_ptr<const vq::Volume> vq;      ///< null for all but .vqv
+  std::shared_ptr<const svmm::Volume> svmm;    ///< null for all but .svmm
+  std::shared_ptr<const vq::Volume> vq;        ///< null for all but .vqv
+  std::shared_ptr<const color::Volume> color;  ///< null for all but .dagc
 };
 
 /// Declares --dims, --endian and --grid, and with `type` also --type as the type of a .raw input.

@@ -1,0 +1,53 @@
+#include "tools/common/color_report.h"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+
+namespace voxkit::cli {
+
+std::string_view name(color::ColorCodec codec) {
+  constexpr std::string_view names[] = {"", "raw", "fws", "vws"};
+  return names[static_cast<size_t>(codec)];
+}
+
+Json params_json(const color::Params& p) {
+  Json json = Json::object();
+  json.set("codec", name(p.codec));
+  if (p.codec != color::ColorCodec::raw) {
+    json.set("threshold", p.threshold);
+    json.set("endpoints", p.endpoints == color::Endpoints::rgb565 ? "565" : "888");
+  }
+  if (p.codec == color::ColorCodec::fws) json.set("weight_bits", p.weight_bits);
+  json.set("colors", p.colors == color::Colors::leaf ? "leaf" : "all");
+  json.set("counts", p.counts == color::Counts::node ? "node" : "pointer");
+  return json;
+}
+
+void add_sizes(const color::Params& p, Json& json) {
+  json.set("leaf_voxels", p.leaf_voxels).set("dag_nodes", p.dag_nodes).set("dag_bytes", p.dag_bytes);
+  json.set("color_count", p.color_count).set("color_bytes", p.color_bytes);
+  json.set("macro_blocks", p.macro_blocks).set("blocks", p.blocks);
+}
+
+double color_percent(const color::Params& p) {
+  return 100 * static_cast<double>(p.color_bytes) /
+         (3 * static_cast<double>(std::max<uint64_t>(p.color_count, 1)));
+}
+
+std::string sizes_text(const color::Params& p) {
+  std::string text = fmt::format(
+      "surface     {} voxels, {} nodes, {} bytes ({:.4g} bits a voxel)\n", p.leaf_voxels, p.dag_nodes,
+      p.dag_bytes,
+      8 * static_cast<double>(p.dag_bytes) / static_cast<double>(std::max<uint64_t>(p.leaf_voxels, 1)));
+  text += fmt::format("colors      {}, {} of {}, {} bytes ({:.4g} % of 24 bits), error {:.4g} a channel\n",
+                      name(p.codec), p.color_count,
+                      p.colors == color::Colors::leaf ? "voxels" : "voxels and nodes", p.color_bytes,
+                      color_percent(p), p.grmse);
+  if (p.codec != color::ColorCodec::raw)
+    text += fmt::format("blocks      {} in {} macro blocks, threshold {:.6g}\n", p.blocks, p.macro_blocks,
+                        p.threshold);
+  return text;
+}
+
+}  // namespace voxkit::cli

@@ -1,0 +1,131 @@
+// dagcolor-pack: a coloured surface as a DAG and an array of compressed colours.
+#include <fmt/core.h>
+
+#include <algorithm>
+
+#include "formats/output_file.h"
+#include "libcolor/compare.h"
+#include "tools/common/color_report.h"
+#include "tools/common/encoding.h"
+#include "tools/common/surface_input.h"
+
+namespace voxkit::cli {
+namespace {
+
+struct Options {
+  std::string input, output;
+  SurfaceOptions surface;
+  std::string codec = "vws", colors = "leaf", counts = "node";
+  color::Options encoder;
+  bool verify = false;
+};
+
+void declare(CommandLine& line, Options& o) {
+  line.argument("INPUT", "RGBA or RGB volume, built-in such as menger:5, or .dagc file", o.input);
+  line.text("-o,--output", "OUT", "Output (.dagc), or -", o.output, true);
+  line.option("--codec", "CODEC",
+              "raw: 24 bits a colour; fws, vws: blocks with weights of fixed and of variable size (vws)",
+              one_of(o.codec, {"raw", "fws", "vws"}));
+  line.option("-e,--threshold", "E",
+              "Of blocks: no colour is further from the original, in RGB of 0 to 255 (9.56)",
+              number(o.encoder.threshold, 0, 1e6));
+  line.option("--weight-bits", "B", "Of fws: bits of a weight, 1 to 4 (3)",
+              integer(o.encoder.weight_bits, 1, color::most_weight_bits));
+  line.option("--effort", "N",
+              "Of blocks: 1: greedy merging, as published; up to 9: smaller files, slower (1)",
+              integer(o.encoder.effort, 1, 9));
+  line.option("--colors", "WHICH", "leaf: those of voxels; all: of all nodes, too (leaf)",
+              one_of(o.colors, {"leaf", "all"}));
+  line.option("--counts", "WHERE", "node: counts in nodes; pointer: beside pointers, larger, faster (node)",
+              one_of(o.counts, {"node", "pointer"}));
+  line.flag("--verify",
+            "Decode and compare before the output appears; exit 1 if the promised bound is broken", o.verify);
+  declare_input_options(line, o.surface.open);
+}
+
+color::Options encoder_options(const Options& o) {
+  color::Options options = o.encoder;
+  options.codec = o.codec == "raw"   ? color::ColorCodec::raw
+                  : o.codec == "fws" ? color::ColorCodec::fws
+                                     : color::ColorCodec::vws;
+  options.colors = o.colors == "all" ? color::Colors::all : color::Colors::leaf;
+  options.counts = o.counts == "pointer" ? color::Counts::pointer : color::Counts::node;
+  return options;
+}
+
+/// Of a side of the grid that was asked for.
+int64_t resolution_of(const VolumeInfo& info) {
+  return std::max({info.dims.x, info.dims.y, info.dims.z});
+}
+
+Json json_of(const Encoding& encoding, const Run& run, const color::Report& report,
+             const std::optional<color::SurfaceDiff>& diff) {
+  const color::Params& p = report.params;
+  Json json = encoding_json(encoding, run, params_json(p));
+  json.set("resolution", resolution_of(encoding.info));
+  add_sizes(p, json);
+  json.set("color_percent", color_percent(p));
+  json.set("color_bits_per_voxel", 8 * static_cast<double>(p.color_bytes) /
+                                       static_cast<double>(std::max<uint64_t>(p.leaf_voxels, 1)));
+  json.set("geometry_bytes", p.dag_bytes).set("grmse", p.grmse).set("max_distance", report.most_error);
+  json.set("build_seconds", report.build_seconds).set("color_seconds", report.color_seconds);
+  if (diff)
+    json.set("rmse", diff->rmse).set("psnr_db", diff->psnr_db).set("max_abs_error", diff->max_abs_error);
+  return json;
+}
+
+Result<int> work(const Options& o, Run& run) {
+  VOX_CHECK(check_encoding(o.input, o.output, o.verify, run));
+  const color::Options options = encoder_options(o);
+  VOX_CHECK(color::validate(options));
+  VOX_TRY(auto source, open_surface(o.input, o.surface, run.ctx));
+  const VolumeInfo info = source->info();
+  VOX_TRY(auto out, OutputFile::create(o.output, run.options.force));
+  run.stage("encode");
+  const double start = run.seconds();
+  VOX_TRY(const color::Report report,
+          color::encode(
+              *source, options, [&](auto bytes) { return out->write(bytes); }, run.ctx));
+  const color::Params& p = report.params;
+  const Encoding encoding{o.input, o.output, info, out->position(), run.seconds() - start, {}};
+
+  std::optional<color::SurfaceDiff> diff;
+  if (o.verify) {
+    run.stage("verify");
+    VOX_TRY(source, open_surface(o.input, o.surface, run.ctx));
+    VOX_TRY(const Input decoded, open_compressed(out->temporary(), 0, run.ctx));
+    VOX_TRY(diff, color::compare(*source, *decoded.color, run.ctx));
+    const double bound = p.codec == color::ColorCodec::raw ? 0 : p.threshold;
+    if (!diff->same_voxels || diff->max_distance > bound) {
+      cli::report(run.tool,
+                  {ErrorCode::internal, o.output,
+                   fmt::format("verification failed: {}, greatest error {:.6g}: expected at most {}; nothing "
+                               "was written",
+                               diff->same_voxels ? "all voxels are there" : "voxels differ",
+                               diff->max_distance, bound)});
+      return 1;
+    }
+  }
+  VOX_CHECK(out->commit());
+  if (run.options.json) VOX_CHECK(print(json_of(encoding, run, report, diff).text()));
+  if (!run.options.quiet && !run.options.json)
+    fmt::print(
+        stderr, "{}: {} voxels in {} bytes: geometry {}, colors {} ({:.4g} %), error {:.4g}, in {:.2f} s{}\n",
+        o.output, p.leaf_voxels, encoding.file_bytes, p.dag_bytes, p.color_bytes, color_percent(p), p.grmse,
+        encoding.seconds, diff ? fmt::format(", greatest error {:.4g}", diff->max_distance) : "");
+  return 0;
+}
+
+}  // namespace
+}  // namespace voxkit::cli
+
+int main(int argc, char** argv) {
+  using namespace voxkit::cli;
+  Options options;
+  return run_tool(
+      argc, argv, "dagcolor-pack", "Compresses a coloured surface: geometry as a DAG, colours apart from it.",
+      "  dagcolor-pack menger:5 -o sponge.dagc\n"
+      "  dagcolor-pack model.nrrd -o model.dagc --threshold 6.38 --verify\n"
+      "  dagcolor-pack model.nrrd -o model.dagc --codec raw\n",
+      [&](CommandLine& line) { declare(line, options); }, [&](Run& run) { return work(options, run); });
+}
