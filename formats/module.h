@@ -1,4 +1,4 @@
-// What a reader module (image_stack.so, openvdb.so, dicom.so) offers to plugin.cc.
+// What a reader module (image_stack.so, openvdb.so, dicom.so, mesh.so) offers to plugin.cc.
 //
 // The libraries behind these readers take up to 0.4 s to load, so programs do not link them: plugin.cc opens
 // the module when a file needs it. Modules and programs share libvoxkit-formats.so, hence one copy of every
@@ -10,12 +10,13 @@
 #include <string>
 
 #include "formats/image.h"
+#include "formats/mesh_parts.h"
 #include "formats/readers.h"
 
 namespace voxkit {
 
 /// Grows with every change of ModuleTable or of a type that it mentions.
-inline constexpr uint32_t module_abi = 3;
+inline constexpr uint32_t module_abi = 4;
 
 struct ModuleTable {
   uint32_t abi = module_abi;
@@ -27,6 +28,8 @@ struct ModuleTable {
   Result<std::optional<Image>> (*read_image)(const std::string& path, Context& ctx) = nullptr;
   Status (*write_image)(const std::string& path, const Image& image, bool force,
                         std::span<const ImageLayer> layers) = nullptr;
+  /// Meshes (mesh only), not yet checked and without textures.
+  Result<MeshParts> (*read_mesh)(const std::string& path, Context& ctx) = nullptr;
 };
 
 /// A module, and what to tell a user who does not have it.
