@@ -8,6 +8,8 @@
 #include <mutex>
 
 #include "formats/parallel.h"
+#include "libcolor/morton.h"
+#include "libcolor/store.h"
 #include "librender/cast_params.h"
 #include "librender/void_boxes.h"
 
@@ -74,11 +76,11 @@ template <int packet_height, class View>
                                              Pixel* pixels, PixelDetail* details, Counts& count) {
   auto cursor = view.cursor();
 
-    Counts counted;  // here, not where tiles beside this one are counted by other threads
+  Counts counted;  // here, not where tiles beside this one are counted by other threads
   const auto keep = [&](int x, int y, const Pixel& pixel, const PixelDetail& detail) {
     const int64_t i = static_cast<int64_t>(y) * params.width + x;
     pixels[i] = pixel;
-        counted.hit += detail.voxel[0] >= 0;
+    counted.hit += detail.voxel[0] >= 0;
     counted.cells += detail.cells;
     if (details != nullptr) details[i] = detail;
   };
@@ -127,7 +129,7 @@ template <int packet_height, class View>
   } else {
     cast_one_by_one(left, right, top, bottom);
   }
-    counted.blocks = cursor.blocks();
+  counted.blocks = cursor.blocks();
   counted.bytes = cursor.bytes();
   count = counted;
 }
@@ -171,6 +173,7 @@ Status cast_with(const View& view, const CastParams& params, const CastOptions& 
     return {};
   }));
   frame.seconds = std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
+  frame.lookup_seconds = 0;
   frame.rays = frame.pixels.size();
   frame.rays_hit = frame.cells_visited = frame.blocks_touched = frame.bytes_touched = 0;
   for (const Counts& count : counts) {
@@ -239,6 +242,55 @@ Status cast(const SvmmGrid& grid, const Camera& camera, const CastOptions& optio
     VOX_CHECK(cast_with(boxed, params, options, frame, ctx));
   }
   return grid.volume().store().status();
+}
+
+namespace {
+
+/// The colours of what was hit, row by row: neighbours are mostly in one block.
+Status look_up_colors(const color::Volume& volume, Frame& frame, Context& ctx) {
+  const auto start = std::chrono::steady_clock::now();
+  VOX_TRY(const color::DagView* const dag, volume.store().dag(volume.container(), volume.params()));
+  constexpr int64_t rows = 16;
+  VOX_CHECK(parallel_for(ctx, (frame.height + rows - 1) / rows, [&](int64_t task) -> Status {
+    color::ColorReader reader(volume.store(), volume.container(), volume.params());
+    const int64_t width = frame.width, first = task * rows * width,
+                  last = std::min<int64_t>((task + 1) * rows, frame.height) * width;
+    for (int64_t i = first; i < last; ++i) {
+      const int32_t(&voxel)[3] = frame.details[static_cast<size_t>(i)].voxel;
+      if (voxel[0] < 0) continue;
+      const uint64_t place = color::morton_code(
+          static_cast<uint32_t>(voxel[0]), static_cast<uint32_t>(voxel[1]), static_cast<uint32_t>(voxel[2]));
+      const color::Rgb c = reader.color(color::find_voxel(*dag, place).color);
+      float(&pixel)[4] = frame.pixels[static_cast<size_t>(i)].colour;
+      const Colour seen = ColourOf(VoxelFormat::rgba32, {})(
+          Voxel::of(static_cast<uint32_t>(c.r | c.g << 8 | c.b << 16) | 0xff000000u));
+      for (int k = 0; k < 3; ++k) pixel[k] = seen.rgb[k];
+    }
+    return {};
+  }));
+  frame.lookup_seconds = std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
+  frame.seconds += frame.lookup_seconds;
+  return volume.store().status();
+}
+
+}  // namespace
+
+Status cast(const DagGrid& grid, const Camera& camera, const CastOptions& options, Frame& frame,
+            Context& ctx) {
+  if (options.traversal == Traversal::baseline) return only_dense_has_baseline();
+  const color::Volume& volume = grid.volume();
+  VOX_TRY(const color::DagView* const dag, volume.store().dag(volume.container(), volume.params()));
+  VOX_TRY(const CastParams params, cast_params(grid.info(), camera, options));
+  CastOptions detailed = options;
+  detailed.details = true;  // where to look colours up
+  if (options.traversal == Traversal::restart) {
+    VOX_CHECK(cast_with(DagCastView<Search::restart>{dag}, params, detailed, frame, ctx));
+  } else {
+    VOX_CHECK(cast_with(DagCastView<Search::path>{dag}, params, detailed, frame, ctx));
+  }
+  VOX_CHECK(look_up_colors(volume, frame, ctx));
+  if (!options.details) frame.details.clear();
+  return {};
 }
 
 }  // namespace voxkit::render

@@ -5,6 +5,7 @@
 #include <vector>
 
 #include "librender/camera.h"
+#include "librender/dag_grid.h"
 #include "librender/grid.h"
 #include "librender/pixel.h"
 
@@ -20,6 +21,7 @@ struct Frame {
   uint64_t blocks_touched = 0;  ///< times that a block was entered
   uint64_t bytes_touched = 0;   ///< of links and values looked at
   double seconds = 0;           ///< of casting alone
+  double lookup_seconds = 0;    ///< of that, for colours that were looked up afterwards
 };
 
 /// path: keeps the path of blocks from the root. restart: searches from the root at every step
@@ -45,5 +47,6 @@ Status cast(const DenseGrid& grid, const Camera& camera, const CastOptions& opti
             Context& ctx);
 Status cast(const SvmmGrid& grid, const Camera& camera, const CastOptions& options, Frame& frame,
             Context& ctx);
+Status cast(const DagGrid& grid, const Camera& camera, const CastOptions& options, Frame& frame, Context& ctx);
 
 }  // namespace voxkit::render

@@ -43,6 +43,7 @@ Status Scene::draw(const Camera& camera, CastOptions options, const DvrOptions& 
   if (dvr) return dvr->draw(camera, dvr_options, frame, ctx);
   options.range = range;
   if (device) return device->cast(camera, options, frame);
+  if (dag) return cast(*dag, camera, options, frame, ctx);
   return compressed ? cast(*compressed, camera, options, frame, ctx)
                     : cast(*dense, camera, options, frame, ctx);
 }
@@ -70,6 +71,9 @@ Result<Scene> open_scene(const std::string& name, const SceneOptions& o, Run& ru
   }
   if (input.svmm) {
     scene.compressed.emplace(input.svmm);
+  } else if (input.color) {
+    if (o.cuda) return fail(ErrorCode::usage, name, "--device cuda: not of a .dagc file: use cpu");
+    scene.dag.emplace(input.color);
   } else {
     run.stage("read");
     VOX_TRY(scene.dense, DenseGrid::read(*input.source, run.ctx));

@@ -207,6 +207,7 @@ struct Costs {
         .set("samples", frame.samples);
     json.set("cells_visited", frame.cells_visited).set("blocks_touched", frame.blocks_touched);
     json.set("bytes_touched", frame.bytes_touched);
+    if (frame.lookup_seconds > 0) json.set("lookup_ms", frame.lookup_seconds * 1000);
     frames.push(std::move(json));
   }
   void write(Json& json) {

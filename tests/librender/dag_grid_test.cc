@@ -1,0 +1,138 @@
+// Compressed surfaces: the picture of the DAG is that of its voxels, one by one, bit by bit.
+#include <gtest/gtest.h>
+
+#include "libcolor/color.h"
+#include "librender/camera.h"
+#include "librender/ray_cast.h"
+#include "tests/libcolor/scenes.h"
+
+namespace voxkit::render {
+namespace {
+
+struct Fixture {
+  MemoryBudget memory;
+  Context ctx;
+  Fixture() {
+    ctx.memory = &memory;
+    ctx.threads = 3;
+  }
+};
+
+class ListSource final : public color::SurfaceSource {
+ public:
+  ListSource(color::Voxels voxels, Index3 dims) : voxels_(std::move(voxels)) {
+    info_.dims = dims;
+    info_.format = VoxelFormat::rgba32;
+    info_.spacing = {1, 0.75, 1.5};
+  }
+  Status read(Context&, const Sink& sink) override { return voxels_.empty() ? Status() : sink(voxels_); }
+
+ private:
+  color::Voxels voxels_;
+};
+
+Result<std::shared_ptr<const color::Volume>> compressed(const color::Voxels& voxels, Index3 dims,
+                                                        color::Counts counts, Context& ctx) {
+  ListSource source(voxels, dims);
+  color::Options options;
+  options.counts = counts;
+  auto bytes = std::make_shared<std::vector<std::byte>>();
+  VOX_CHECK(color::encode(
+      source, options,
+      [&](std::span<const std::byte> some) -> Status {
+        bytes->insert(bytes->end(), some.begin(), some.end());
+        return {};
+      },
+      ctx));
+  VOX_TRY(auto container, Container::open(*bytes, "file", bytes));
+  return color::Volume::open(container);
+}
+
+TEST(DagGrid, PicturesAreThoseOfTheVoxels) {
+  const std::vector<std::pair<color::Voxels, Index3>> scenes = {
+      {{}, Index3(9)},
+      {{{63, {9, 200, 31}}}, Index3(4)},
+      {color::sphere_shell(6), Index3(64)},
+      {color::voxels_where(5,
+                           [](uint32_t x, uint32_t y, uint32_t z) {
+                             return x < 20 && y < 31 && z < 9 && (x * 7 + y * 3 + z) % 11 == 0;
+                           }),
+       Index3(20, 31, 9)},
+      {color::voxels_where(
+           6, [](uint32_t x, uint32_t y, uint32_t z) { return x == y || (z == 5 && x % 9 == 0); }),
+       Index3(64)}};
+  for (const auto& [voxels, dims] : scenes)
+    for (const color::Counts counts : {color::Counts::node, color::Counts::pointer}) {
+      Fixture f;
+      const auto volume = compressed(voxels, dims, counts, f.ctx);
+      ASSERT_TRUE(volume) << volume.error().what;
+      const auto decoded = color::open_source(*volume);
+      const auto dense = DenseGrid::read(*decoded, f.ctx);
+      ASSERT_TRUE(dense);
+      const DagGrid grid(*volume);
+      for (const double distance : {0.2, 0.9, 1.8})
+        for (const double azimuth : {0.0, 33.0, 215.0}) {
+          const Camera camera = Camera::orbit(azimuth, 20, distance, 45);
+          CastOptions options;
+          options.width = 97;
+          options.height = 64;
+          options.details = true;
+          Frame expected, frame;
+          ASSERT_TRUE(cast(**dense, camera, options, expected, f.ctx));
+          for (const Traversal traversal : {Traversal::path, Traversal::restart})
+            for (const bool native : {true, false}) {
+              options.traversal = traversal;
+              options.native = native;
+              ASSERT_TRUE(cast(grid, camera, options, frame, f.ctx));
+              EXPECT_EQ(frame.rays_hit, expected.rays_hit);
+              for (size_t i = 0; i < frame.pixels.size(); ++i) {
+                for (int k = 0; k < 4; ++k)
+                  ASSERT_EQ(frame.pixels[i].colour[k], expected.pixels[i].colour[k]);
+                ASSERT_EQ(frame.pixels[i].distance, expected.pixels[i].distance);
+                for (int a = 0; a < 3; ++a)
+                  ASSERT_EQ(frame.details[i].voxel[a], expected.details[i].voxel[a]);
+              }
+            }
+          options.traversal = Traversal::path;
+        }
+    }
+}
+
+TEST(DagGrid, EmptySpaceIsCrossedInFewSteps) {
+  Fixture f;
+  const auto volume = compressed({{(uint64_t{1} << 36) - 1, {}}}, Index3(4096), color::Counts::node, f.ctx);
+  ASSERT_TRUE(volume);
+  CastOptions options;
+  options.width = options.height = 32;
+  Frame frame;
+  ASSERT_TRUE(cast(DagGrid(*volume), Camera::orbit(30, 20, 1.8, 45), options, frame, f.ctx));
+  EXPECT_LT(frame.cells_visited, frame.rays * 40);
+}
+
+TEST(DagGrid, DamagedColorsAreAnError) {
+  Fixture f;
+  ListSource source(color::sphere_shell(5), Index3(32));
+  auto bytes = std::make_shared<std::vector<std::byte>>();
+  ASSERT_TRUE(color::encode(
+      source, {},
+      [&](std::span<const std::byte> some) -> Status {
+        bytes->insert(bytes->end(), some.begin(), some.end());
+        return {};
+      },
+      f.ctx));
+  auto container = Container::open(*bytes, "file", bytes);
+  ASSERT_TRUE(container);
+  for (const ChunkEntry& entry : (*container)->table())
+    if (entry.kind == chunk_kind("COLR")) (*bytes)[entry.offset + 9] ^= std::byte{1};
+  container = Container::open(*bytes, "file", bytes);
+  ASSERT_TRUE(container);
+  const auto volume = color::Volume::open(*container);
+  ASSERT_TRUE(volume);
+  Frame frame;
+  const Status status = cast(DagGrid(*volume), Camera::orbit(30, 20, 1.8, 45), {}, frame, f.ctx);
+  ASSERT_FALSE(status);
+  EXPECT_EQ(status.error().code, ErrorCode::input);
+}
+
+}  // namespace
+}  // namespace voxkit::render
