@@ -15,14 +15,21 @@ namespace {
 struct Options {
   std::string input, output;
   SurfaceOptions surface;
-  std::string codec = "vws", colors = "leaf", counts = "node";
+  std::string kind = "thin", codec = "vws", colors = "leaf", counts = "node";
   color::Options encoder;
   bool verify = false;
 };
 
 void declare(CommandLine& line, Options& o) {
-  line.argument("INPUT", "RGBA or RGB volume, built-in such as menger:5, or .dagc file", o.input);
+  line.argument("INPUT",
+                "Mesh (.obj .gltf .glb .ply), RGBA or RGB volume, built-in such as menger:5, or .dagc file",
+                o.input);
   line.text("-o,--output", "OUT", "Output (.dagc), or -", o.output, true);
+  line.option("--resolution", "N", "Of a mesh: voxels along its longest side (1024)",
+              integer(o.surface.resolution, 1, int64_t{1} << color::most_levels));
+  line.option("--surface", "KIND",
+              "Of a mesh: thin: no more voxels than make it tight; conservative: all that it touches (thin)",
+              one_of(o.kind, {"thin", "conservative"}));
   line.option("--codec", "CODEC",
               "raw: 24 bits a colour; fws, vws: blocks with weights of fixed and of variable size (vws)",
               one_of(o.codec, {"raw", "fws", "vws"}));
@@ -78,7 +85,10 @@ Result<int> work(const Options& o, Run& run) {
   VOX_CHECK(check_encoding(o.input, o.output, o.verify, run));
   const color::Options options = encoder_options(o);
   VOX_CHECK(color::validate(options));
-  VOX_TRY(auto source, open_surface(o.input, o.surface, run.ctx));
+  SurfaceOptions surface = o.surface;
+  surface.kind = o.kind == "thin" ? color::SurfaceKind::thin : color::SurfaceKind::conservative;
+  run.stage("read");
+  VOX_TRY(auto source, open_surface(o.input, surface, run.ctx));
   const VolumeInfo info = source->info();
   VOX_TRY(auto out, OutputFile::create(o.output, run.options.force));
   run.stage("encode");
@@ -92,7 +102,7 @@ Result<int> work(const Options& o, Run& run) {
   std::optional<color::SurfaceDiff> diff;
   if (o.verify) {
     run.stage("verify");
-    VOX_TRY(source, open_surface(o.input, o.surface, run.ctx));
+    VOX_TRY(source, open_surface(o.input, surface, run.ctx));
     VOX_TRY(const Input decoded, open_compressed(out->temporary(), 0, run.ctx));
     VOX_TRY(diff, color::compare(*source, *decoded.color, run.ctx));
     const double bound = p.codec == color::ColorCodec::raw ? 0 : p.threshold;
@@ -125,6 +135,7 @@ int main(int argc, char** argv) {
   return run_tool(
       argc, argv, "dagcolor-pack", "Compresses a coloured surface: geometry as a DAG, colours apart from it.",
       "  dagcolor-pack menger:5 -o sponge.dagc\n"
+      "  dagcolor-pack house.glb -o house.dagc --resolution 4096\n"
       "  dagcolor-pack model.nrrd -o model.dagc --threshold 6.38 --verify\n"
       "  dagcolor-pack model.nrrd -o model.dagc --codec raw\n",
       [&](CommandLine& line) { declare(line, options); }, [&](Run& run) { return work(options, run); });

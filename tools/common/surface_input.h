@@ -6,15 +6,18 @@
 #include <string>
 
 #include "libcolor/surface.h"
+#include "libcolor/triangle_cells.h"
 #include "tools/common/input.h"
 
 namespace voxkit::cli {
 
 struct SurfaceOptions {
   OpenOptions open;
+  std::optional<int64_t> resolution;  ///< of meshes: voxels along the longest side
+  color::SurfaceKind kind = color::SurfaceKind::thin;
 };
 
-/// Opens a surface; it can be read once.
+/// Opens a surface; it can be read once. ErrorCode::usage where the options do not go with it.
 Result<std::unique_ptr<color::SurfaceSource>> open_surface(const std::string& name,
                                                            const SurfaceOptions& options, Context& ctx);
 
