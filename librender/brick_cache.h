@@ -4,11 +4,13 @@
 #include <algorithm>
 #include <cstdint>
 #include <memory>
+#include <type_traits>
 #include <vector>
 
 #include "formats/hd.h"
 #include "librender/dvr_lanes.h"
 #include "librender/grid.h"
+#include "librender/transfer.h"
 #include "libsvmm/svmm.h"
 #include "libvq/vq.h"
 
@@ -27,20 +29,51 @@ class BrickReader {
   virtual void read(uint32_t x, uint32_t y, uint32_t z, T* values) = 0;
   /// Forgets what it remembers.
   virtual void forget() {}
-  /// Bricks decoded so far.
+  /// Times that a brick was decoded so far.
   uint64_t decoded() const { return decoded_; }
+  /// Which bricks were, a bit each, x fastest.
+  const std::vector<uint64_t>& places() const { return places_; }
 
  protected:
+  /// `bricks`: of the volume.
+  explicit BrickReader(Index3 bricks)
+      : bricks_(bricks), places_(static_cast<size_t>(bricks.x * bricks.y * bricks.z + 63) / 64) {}
+  const Index3& bricks() const { return bricks_; }
+  /// A brick is being decoded.
+  void count(uint32_t x, uint32_t y, uint32_t z) {
+    const auto place = static_cast<uint64_t>((z * bricks_.y + y) * bricks_.x + x);
+    places_[place / 64] |= uint64_t{1} << place % 64;
+    ++decoded_;
+  }
+
+ private:
+  Index3 bricks_;
   uint64_t decoded_ = 0;
+  std::vector<uint64_t> places_;
 };
 
 template <class T>
 std::unique_ptr<BrickReader<T>> brick_reader(std::shared_ptr<const DenseGrid> grid);
 template <class T>
 std::unique_ptr<BrickReader<T>> brick_reader(std::shared_ptr<const svmm::Volume> volume);
-/// Remembers decoded bricks by their id, so that equal ones are decoded once.
+/// Remembers decoded bricks by their id, so that equal ones are decoded once. With a transfer function, what
+/// it does not show may have other values that it does not show either; so bricks whose ranges say that no
+/// cell here shows them need not be decoded. (vq_brick_reader.cc)
 template <class T>
-std::unique_ptr<BrickReader<T>> brick_reader(std::shared_ptr<const vq::Volume> volume);
+std::unique_ptr<BrickReader<T>> brick_reader(std::shared_ptr<const vq::Volume> volume,
+                                             const TransferFunction* shown);
+
+inline Index3 bricks_of(const VolumeInfo& info) {
+  return (info.dims + Index3(vq::brick_edge - 1)) / Index3(vq::brick_edge);
+}
+/// A stored value: integers as they are.
+template <class T>
+T value_of(const Voxel& voxel) {
+  if constexpr (std::is_floating_point_v<T>)
+    return voxel.as<float>();
+  else
+    return static_cast<T>(voxel.as<uint32_t>());
+}
 
 /// Direct-mapped by the brick's place.
 template <class T>

@@ -77,6 +77,7 @@ Status begin_frame(const CastParams& cast, bool details, DvrFrame& frame, Contex
   frame.details.resize(details ? frame.pixels.size() : 0);
   frame.rays = frame.pixels.size();
   frame.rays_hit = frame.cells_visited = frame.blocks_touched = frame.bytes_touched = frame.samples = 0;
+  frame.bricks_decoded = 0;
   return parallel_for(ctx, cast.height, [&](int64_t y) -> Status {
     const bool row = y >= cast.top && y < cast.bottom;
     const int left = row ? std::min(cast.left, cast.width) : cast.width,
@@ -126,14 +127,17 @@ Result<DvrScene> DvrScene::create(std::shared_ptr<const DvrVolume> volume, Trans
 Status DvrScene::draw(const Camera& camera, const DvrOptions& options, DvrFrame& frame, Context& ctx) const {
   const VolumeInfo& info = volume_->info();
   VOX_TRY(const DvrParams params, dvr_params(info, camera, options, transfer_, skips_));
-  const DvrJob job{
+  DvrJob job{
       .params = params,
       .gradient = !options.lit && options.modulate <= 0    ? DvrGradient::none
                   : options.gradient == Gradient::analytic ? DvrGradient::analytic
                                                            : DvrGradient::neighbour,
       .native = options.native,
       .details = options.details,
+      .shown = nullptr,
   };
+  // Gradients from neighbouring rays need what these have there, seen or not.
+  if (options.skip && job.gradient != DvrGradient::neighbour) job.shown = &transfer_;
   const auto start = std::chrono::steady_clock::now();
   VOX_CHECK(begin_frame(params.cast, options.details, frame, ctx));
   if (volume_->dense() && is_direct(*volume_->dense())) {

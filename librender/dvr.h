@@ -55,9 +55,10 @@ struct DvrOptions {
 };
 
 /// A frame, and how many samples were taken for it. cells_visited: places looked at, each of up to 8 rays;
-/// blocks_touched: bricks decoded. How often a brick is decoded depends on the picture, not on threads.
+/// blocks_touched: times that a brick was decoded. All counts depend on the picture, not on threads.
 struct DvrFrame : Frame {
   uint64_t samples = 0;
+  uint64_t bricks_decoded = 0;  ///< places of bricks that were decoded, each counted once
 };
 
 /// A volume seen through a transfer function, for any number of pictures.

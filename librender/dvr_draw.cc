@@ -1,5 +1,6 @@
 #include "librender/dvr_draw.h"
 
+#include <bit>
 #include <mutex>
 
 #include "formats/parallel.h"
@@ -161,11 +162,11 @@ Status draw_bricks(const DvrVolume& volume, const DvrJob& job, DvrFrame& frame, 
         return cache;
       }
     }
-    return std::make_unique<BrickCache<T>>(volume.vq()     ? brick_reader<T>(volume.vq())
+    return std::make_unique<BrickCache<T>>(volume.vq()     ? brick_reader<T>(volume.vq(), job.shown)
                                            : volume.svmm() ? brick_reader<T>(volume.svmm())
                                                            : brick_reader<T>(volume.dense()));
   };
-  return over_tiles(job.params, frame, ctx, [&](const Tile& tile, Counts& count) -> Status {
+  VOX_CHECK(over_tiles(job.params, frame, ctx, [&](const Tile& tile, Counts& count) -> Status {
     auto cache = take();
     cache->forget();  // what a tile costs depends on nothing else
     const uint64_t before = cache->reader().decoded();
@@ -175,7 +176,13 @@ Status draw_bricks(const DvrVolume& volume, const DvrJob& job, DvrFrame& frame, 
     const std::lock_guard lock(mutex);
     idle.push_back(std::move(cache));
     return {};
-  });
+  }));
+  for (size_t word = 0; !idle.empty() && word < idle[0]->reader().places().size(); ++word) {
+    uint64_t places = 0;
+    for (const auto& cache : idle) places |= cache->reader().places()[word];
+    frame.bricks_decoded += static_cast<uint64_t>(std::popcount(places));
+  }
+  return {};
 }
 
 template Status draw_bricks<uint16_t>(const DvrVolume&, const DvrJob&, DvrFrame&, Context&);

@@ -11,6 +11,7 @@ struct DvrJob {
   DvrParams params;
   DvrGradient gradient;
   bool native, details;
+  const TransferFunction* shown;  ///< null: values that cannot be seen are needed, too
 };
 
 /// Fills the pixels and counts of a frame whose size is set. `Sampler` is one of dvr_packet.h. Errors: those

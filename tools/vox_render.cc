@@ -206,7 +206,7 @@ struct Costs {
         .set("rays_hit", frame.rays_hit)
         .set("samples", frame.samples);
     json.set("cells_visited", frame.cells_visited).set("blocks_touched", frame.blocks_touched);
-    json.set("bytes_touched", frame.bytes_touched);
+    json.set("bytes_touched", frame.bytes_touched).set("bricks_decoded", frame.bricks_decoded);
     if (frame.lookup_seconds > 0) json.set("lookup_ms", frame.lookup_seconds * 1000);
     frames.push(std::move(json));
   }

@@ -302,7 +302,31 @@ TEST(Dvr, SkippingLooksAtLittle) {
   expect_same(skipped, all);
   EXPECT_LT(skipped.samples * 2, all.samples);
   EXPECT_LT(skipped.cells_visited * 2, all.cells_visited);
-  EXPECT_LE(skipped.blocks_touched, all.blocks_touched);
+  EXPECT_LT(skipped.blocks_touched, all.blocks_touched);
+  EXPECT_LT(skipped.bricks_decoded, all.bricks_decoded);
+  EXPECT_LE(skipped.bricks_decoded, skipped.blocks_touched);
+}
+
+TEST(Dvr, BricksOfWhichNothingIsSeenAreNotDecoded) {
+  // Rows of bricks along x: noise that is seen up to x = 5, noise that is not from there on.
+  const VolumeInfo info = vq::test::integer_info({16, 4, 4}, 8);
+  std::vector<std::byte> voxels(256);
+  for (size_t i = 0; i < voxels.size(); ++i)
+    voxels[i] = std::byte(i % 16 <= 5 ? 200 + i * 7 % 50 : 1 + i * 5 % 60);
+  voxkit::test::MemorySource source(info, voxels);
+  const DvrScene scene = scene_of(vq::test::encode_to_memory(source).open(), ramp(100, 250)),
+                 plain = scene_of(dense(source), ramp(100, 250));
+  for (const double azimuth : {30.0, 90.0, 200.0, 270.0}) {
+    const Camera camera = Camera::orbit(azimuth, 20, 1.5, 45);
+    const DvrFrame frame = draw(scene, camera, small());
+    expect_same(frame, draw(plain, camera, small()));
+    EXPECT_EQ(frame.bricks_decoded, 2u) << azimuth;  // the second one has both kinds, and nothing at its end
+    DvrOptions options = small();
+    options.gradient = Gradient::neighbour;
+    expect_same(draw(scene, camera, options), draw(plain, camera, options));
+    options.skip = false;
+    EXPECT_EQ(draw(scene, camera, options).bricks_decoded, 4u);
+  }
 }
 
 TEST(Dvr, ColoursAndTooManySamplesAreRefused) {
