@@ -105,51 +105,67 @@ namespace {
 
 /// The voxels that the codes of a brick stand for.
 template <class T>
-void to_voxels(const Brick& codes, const Params& params, int32_t most, std::byte* out) {
-  std::array<T, brick_voxels> voxels;
+void to_voxels(const Brick& codes, const Params& params, int32_t most, std::array<T, brick_voxels>& voxels) {
   if constexpr (std::is_floating_point_v<T>) {
     for (size_t i = 0; i < codes.size(); ++i)
       voxels[i] = static_cast<T>(params.base + params.step * codes[i]);
   } else {
     const auto base = static_cast<int64_t>(params.base), step = static_cast<int64_t>(params.step);
-    if (step == 1 && base >= 0) {
-      const auto offset = static_cast<int32_t>(base);
-      for (size_t i = 0; i < codes.size(); ++i)
-        voxels[i] = static_cast<T>(std::min<int32_t>(offset + codes[i], most));
+    if (step == 1 && base >= 0 && base <= most) {  // 16 bits are enough, and vectors hold more of them
+      const auto offset = static_cast<uint16_t>(base), room = static_cast<uint16_t>(most - base);
+      for (size_t i = 0; i < codes.size(); ++i) voxels[i] = static_cast<T>(std::min(codes[i], room) + offset);
     } else {
       for (size_t i = 0; i < codes.size(); ++i)
         voxels[i] = static_cast<T>(std::clamp<int64_t>(base + step * codes[i], 0, most));
     }
   }
-  std::memcpy(out, voxels.data(), sizeof voxels);
 }
 
-void to_voxels(const Brick& codes, VoxelFormat format, const Params& params, std::byte* out) {
-  switch (format) {
-    case VoxelFormat::float32:
-      return to_voxels<float>(codes, params, 0, out);
-    case VoxelFormat::density16:
-      return to_voxels<uint16_t>(codes, params, 65535, out);
-    default:
-      return to_voxels<uint8_t>(codes, params, format == VoxelFormat::bitmap ? 1 : 255, out);
-  }
-}
+/// Bricks along x that are decoded side by side before their rows are copied: rows of a box can be so far
+/// apart that pieces of a brick's width would drive each other out of the cache.
+constexpr int64_t run_bricks = 64;
 
-/// Copies the part of a brick, of 4^3 voxels of `bytes` bytes, that begins at `from`.
-void copy_part(const std::byte* brick, Index3 from, Index3 size, int bytes, VoxelSpan out) {
-  const auto row_of = [&](int64_t y, int64_t z) {
-    return brick + (from.x + 4 * (from.y + y) + 16 * (from.z + z)) * bytes;
-  };
-  const auto copy_rows = [&](auto width) {  // a constant, where rows are whole
-    for (int64_t z = 0; z < size.z; ++z)
-      for (int64_t y = 0; y < size.y; ++y)
-        std::memcpy(out.row(y, z), row_of(y, z), static_cast<size_t>(width));
-  };
-  const int64_t width = size.x * bytes;
-  if (width == 4) return copy_rows(std::integral_constant<int, 4>());
-  if (width == 8) return copy_rows(std::integral_constant<int, 8>());
-  if (width == 16) return copy_rows(std::integral_constant<int, 16>());
-  copy_rows(width);
+/// Decodes a box of voxels of type T, none above `most`; returns how many bricks were read.
+template <class T>
+Result<uint64_t> decode_box(const Decoder& decoder, const Box& box, int32_t most, VoxelSpan out) {
+  const Params& params = decoder.volume.params();
+  const Index3 first = box.lo / Index3(brick_edge), last = (box.hi - Index3(1)) / Index3(brick_edge);
+  Brick codes;
+  std::array<T, brick_voxels> voxels;
+  std::array<T, brick_voxels * run_bricks> rows;  // 16 of run_bricks * 4 voxels
+  uint64_t decoded = no_id, count = 0;
+  for (int64_t z = first.z; z <= last.z; ++z)
+    for (int64_t y = first.y; y <= last.y; ++y)
+      for (int64_t begin = first.x; begin <= last.x; begin += run_bricks) {
+        const int64_t end = std::min(begin + run_bricks, last.x + 1);
+        for (int64_t x = begin; x < end; ++x) {
+          const uint64_t id = decoder.id_at({x, y, z});
+          if (id == no_id) return decoder.no_place({x, y, z});
+          if (id != decoded) {
+            Record record;
+            if (!decoder.reader.find(id, record) || !decoder.reader.decode(record, codes.data()))
+              return decoder.no_brick(id);
+            to_voxels(codes, params, most, voxels);
+            decoded = id;
+          }
+          T* const to = &rows[static_cast<size_t>((x - begin) * brick_edge)];
+          for (size_t row = 0; row < 16; ++row)
+            std::memcpy(to + row * run_bricks * brick_edge, &voxels[row * brick_edge],
+                        brick_edge * sizeof(T));
+        }
+        count += static_cast<uint64_t>(end - begin);
+        const Index3 corner = Index3(begin, y, z) * int64_t{brick_edge};
+        const Box part = intersect({corner, Index3(end, y + 1, z + 1) * int64_t{brick_edge}}, box);
+        const Index3 from = part.lo - corner, to = part.lo - box.lo, size = part.size();
+        for (int64_t v = 0; v < size.z; ++v)
+          for (int64_t u = 0; u < size.y; ++u) {
+            const int64_t row = from.y + u + 4 * (from.z + v);
+            std::memcpy(out.row(to.y + u, to.z + v) + to.x * static_cast<int64_t>(sizeof(T)),
+                        &rows[static_cast<size_t>(row * run_bricks * brick_edge + from.x)],
+                        static_cast<size_t>(size.x) * sizeof(T));
+          }
+      }
+  return count;
 }
 
 }  // namespace
@@ -159,31 +175,14 @@ Result<uint64_t> Volume::decode(const Box& box, VoxelSpan out) const {
   if (!info_.box().contains(box))
     return fail(ErrorCode::internal, container_->name(), "box outside the volume");
   const Decoder decoder{*this};
-  const int bytes = voxel_bytes(info_.format);
-  const Index3 first = box.lo / Index3(brick_edge), last = (box.hi - Index3(1)) / Index3(brick_edge);
-  Brick codes;
-  std::array<std::byte, brick_voxels * sizeof(float)> voxels;
-  uint64_t decoded = no_id, count = 0;
-  for (int64_t z = first.z; z <= last.z; ++z)
-    for (int64_t y = first.y; y <= last.y; ++y)
-      for (int64_t x = first.x; x <= last.x; ++x) {
-        const uint64_t id = decoder.id_at({x, y, z});
-        if (id == no_id) return decoder.no_place({x, y, z});
-        ++count;
-        if (id != decoded) {
-          Record record;
-          if (!decoder.reader.find(id, record) || !decoder.reader.decode(record, codes.data()))
-            return decoder.no_brick(id);
-          to_voxels(codes, info_.format, params_, voxels.data());
-          decoded = id;
-        }
-        const Index3 corner = Index3(x, y, z) * int64_t{brick_edge};
-        const Box part = intersect({corner, corner + Index3(brick_edge)}, box);
-        const Index3 to = part.lo - box.lo;
-        copy_part(voxels.data(), part.lo - corner, part.size(), bytes,
-                  {out.row(to.y, to.z) + to.x * bytes, out.row_stride, out.slice_stride});
-      }
-  return count;
+  switch (info_.format) {
+    case VoxelFormat::float32:
+      return decode_box<float>(decoder, box, 0, out);
+    case VoxelFormat::density16:
+      return decode_box<uint16_t>(decoder, box, 65535, out);
+    default:
+      return decode_box<uint8_t>(decoder, box, info_.format == VoxelFormat::bitmap ? 1 : 255, out);
+  }
 }
 
 std::optional<Voxel> Volume::uniform(const Box& box) const {

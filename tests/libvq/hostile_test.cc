@@ -197,6 +197,27 @@ TEST(VqHostile, AFileMadeByHand) {
   }
 }
 
+/// Values that the voxels cannot hold become the nearest that they can, in boxes as in single voxels.
+TEST(VqHostile, ValuesBeyondTheFormat) {
+  const auto codes = attack(Chunks(true).file()).voxels;
+  ASSERT_TRUE(codes);
+  for (const double base :
+       {0.0, 1.0, 246.0, 250.0, 254.0, 255.0, 256.0, 65535.0, 131070.0, -1.0, -5.0, -300.0})
+    for (const double step : {1.0, 2.0, 40.0, 131071.0}) {
+      Chunks chunks(true);
+      std::memcpy(&chunks.params[24], &base, sizeof base);
+      std::memcpy(&chunks.params[32], &step, sizeof step);
+      const Answer answer = attack(chunks.file());
+      EXPECT_EQ(answer.fault, "");
+      Bytes expected;
+      for (const std::byte code : *codes) {
+        const double value = base + step * std::to_integer<int>(code);
+        expected.push_back(static_cast<std::byte>(std::clamp(value, 0.0, 255.0)));
+      }
+      EXPECT_EQ(answer.voxels, expected) << "base " << base << ", step " << step;
+    }
+}
+
 /// Each field that readers check, with a value that they refuse: when opening, or when it is used.
 TEST(VqHostile, FieldsThatAreRefused) {
   enum class Where { params, offsets, addresses, codebook };
