@@ -46,6 +46,24 @@ constexpr auto slopes = [] {
   return all;
 }();
 
+/// Where a face has the prediction of its own plane (`median_bounded`), the other two are made 0 and 65535,
+/// which leaves that one in the middle. Of rows (y, z) at x = 0, and where x > 0.
+struct alignas(32) FaceMasks {
+  uint16_t no_xy[16], full_xz[16];
+};
+constexpr auto faces = [] {
+  std::array<FaceMasks, 8> all{};
+  for (int step = 0; step < 8; ++step)
+    for (int y = 0; y < 4; ++y)
+      for (int z = 1; z < 4; ++z) {
+        FaceMasks& m = all[static_cast<size_t>(step)];
+        const bool first = step == y + z;  // x = 0
+        m.no_xy[y + 4 * z] = y == 0 || first ? 0xffff : 0;
+        m.full_xz[y + 4 * z] = y != 0 && first ? 0xffff : 0;
+      }
+  return all;
+}();
+
 using Vector = __m256i;
 
 VOXKIT_AVX2_CODE Vector unpack(const std::byte* bytes, int width) {
@@ -72,16 +90,38 @@ VOXKIT_AVX2_CODE Vector slope(int k) {
   return *reinterpret_cast<const Vector*>(slopes[static_cast<size_t>(k)].lane);
 }
 
-/// a + b - ab, not below 0 nor above 65535.
-VOXKIT_AVX2_CODE Vector plane_of(Vector a, Vector b, Vector ab) {
-  return _mm256_subs_epu16(_mm256_adds_epu16(b, _mm256_subs_epu16(a, ab)), _mm256_subs_epu16(ab, a));
+/// a + b - ab, not below 0 nor above 65535; where `full` 65535 if ab <= a, where `none` 0.
+VOXKIT_AVX2_CODE Vector plane_of(Vector a, Vector b, Vector ab, Vector full, Vector none) {
+  const Vector up = _mm256_or_si256(_mm256_subs_epu16(a, ab), full);
+  return _mm256_subs_epu16(_mm256_adds_epu16(b, up), _mm256_or_si256(_mm256_subs_epu16(ab, a), none));
 }
+/// Tops below this leave room for shorter ways.
+constexpr uint32_t narrow_tops = 1 << 14;
+
 /// a + b modulo top + 1.
+template <bool narrow>
 VOXKIT_AVX2_CODE Vector add_modulo(Vector a, Vector b, Vector top, Vector modulus) {
-  const Vector fits = at_most(b, _mm256_sub_epi16(top, a));
-  return _mm256_sub_epi16(_mm256_add_epi16(a, b), _mm256_andnot_si256(fits, modulus));
+  // One of both is below modulus, the other one is not, or has wrapped around.
+  if constexpr (narrow) {
+    return _mm256_min_epu16(_mm256_add_epi16(a, b), _mm256_add_epi16(a, _mm256_sub_epi16(b, modulus)));
+  } else {
+    const Vector fits = at_most(b, _mm256_sub_epi16(top, a));
+    return _mm256_sub_epi16(_mm256_add_epi16(a, b), _mm256_andnot_si256(fits, modulus));
+  }
 }
-VOXKIT_AVX2_CODE Vector unfold_to_bounds(Vector code, Vector predicted, Vector top) {
+/// `unfold_bounded`. With p the prediction, or for odd codes, which count downwards, top - p and the result
+/// likewise: p + (code + 1) / 2 if that is at most top, but where it is less than the code, the code; else
+/// top - code.
+VOXKIT_AVX2_CODE Vector unfold_narrow(Vector code, Vector predicted, Vector top, Vector modulus) {
+  const Vector odd = _mm256_sub_epi16(_mm256_setzero_si256(), _mm256_and_si256(code, _mm256_set1_epi16(1)));
+  const Vector turn = _mm256_and_si256(odd, modulus);  // (v ^ odd) + turn: v, or top - v
+  const Vector distance = _mm256_add_epi16(_mm256_avg_epu16(code, _mm256_setzero_si256()), turn);
+  const Vector near = _mm256_max_epi16(_mm256_add_epi16(_mm256_xor_si256(predicted, odd), distance), code);
+  const Vector fits = _mm256_cmpgt_epi16(modulus, near);
+  const Vector voxel = _mm256_min_epu16(near, _mm256_or_si256(_mm256_sub_epi16(top, code), fits));
+  return _mm256_add_epi16(_mm256_xor_si256(voxel, odd), turn);
+}
+VOXKIT_AVX2_CODE Vector unfold_wide(Vector code, Vector predicted, Vector top) {
   const Vector room = _mm256_sub_epi16(top, predicted), low = at_most(predicted, room);
   const Vector near = _mm256_min_epu16(predicted, room);
   const Vector odd = _mm256_sub_epi16(_mm256_setzero_si256(), _mm256_and_si256(code, _mm256_set1_epi16(1)));
@@ -90,36 +130,38 @@ VOXKIT_AVX2_CODE Vector unfold_to_bounds(Vector code, Vector predicted, Vector t
   return _mm256_blendv_epi8(one_side, both_sides, at_most(code, _mm256_add_epi16(near, near)));
 }
 
-/// Residuals of columns x = 0 .. 3, of the transforms with medians, become voxels.
-template <bool bounded>
+/// Residuals of columns x = 0 .. 3, of the transforms with medians, become voxels. Rows that have not begun
+/// are 0, as is what lies outside the brick: so are their codes, and their predictions.
+template <bool bounded, bool narrow>
 VOXKIT_AVX2_CODE void invert_medians(Vector* columns, Vector top, Vector modulus) {
   const Vector zero = _mm256_setzero_si256();
-  Vector steps[10], reached = zero, before = zero, before_b = zero, before_c = zero;
+  const Vector no_xz = bounded ? _mm256_setr_epi64x(-1, 0, 0, 0) : zero;                   // z = 0
+  const Vector full_yz = bounded ? _mm256_setr_epi64x(-1, 0xffff, 0xffff, 0xffff) : zero;  // or y = 0
+  Vector steps[10], before = zero, before_b = zero, before_c = zero;
 #pragma GCC unroll 10
   for (int t = 0; t < 10; ++t) {
     Vector code = zero;
 #pragma GCC unroll 4
     for (int x = 0; x < 4; ++x)
       if (t - x >= 0 && t - x <= 6) code = _mm256_or_si256(code, _mm256_and_si256(columns[x], slope(t - x)));
+    const FaceMasks& face = faces[static_cast<size_t>(t < 7 ? t : 7)];
+    const Vector no_xy = bounded ? *reinterpret_cast<const Vector*>(face.no_xy) : zero;
+    const Vector full_xz = bounded ? *reinterpret_cast<const Vector*>(face.full_xz) : zero;
     const Vector a = before, b = below_y(a), c = below_z(a);
     const Vector ab = before_b, ac = before_c, bc = below_y(before_c);
-    const Vector xy = plane_of(a, b, ab), xz = plane_of(a, c, ac), yz = plane_of(b, c, bc);
+    const Vector xy = plane_of(a, b, ab, zero, no_xy);
+    const Vector xz = plane_of(a, c, ac, full_xz, no_xz), yz = plane_of(b, c, bc, full_yz, zero);
     const Vector low = _mm256_min_epu16(xy, xz), high = _mm256_max_epu16(xy, xz);
-    Vector predicted = _mm256_max_epu16(low, _mm256_min_epu16(high, yz)), voxel;
-    if constexpr (bounded) {
-      if (t <= 6) predicted = _mm256_blendv_epi8(predicted, yz, slope(t));
-      const Vector bottom = _mm256_set1_epi64x(0xffff);  // y = 0
-      predicted = _mm256_blendv_epi8(predicted, xz, bottom);
-      predicted = _mm256_blend_epi32(predicted, xy, 0x03);  // z = 0
-      voxel = unfold_to_bounds(code, _mm256_min_epu16(predicted, top), top);
+    const Vector median = _mm256_max_epu16(low, _mm256_min_epu16(high, yz));
+    const Vector predicted = _mm256_min_epu16(median, top);
+    if constexpr (!bounded) {
+      before = add_modulo<narrow>(predicted, code, top, modulus);
+    } else if constexpr (narrow) {
+      before = unfold_narrow(code, predicted, top, modulus);
     } else {
-      voxel = add_modulo(_mm256_min_epu16(predicted, top), code, top, modulus);
+      before = unfold_wide(code, predicted, top);
     }
-    if (t <= 6) {
-      reached = _mm256_or_si256(reached, slope(t));
-      voxel = _mm256_and_si256(voxel, reached);
-    }
-    steps[t] = before = voxel;
+    steps[t] = before;
     before_b = b;
     before_c = c;
   }
@@ -133,16 +175,17 @@ VOXKIT_AVX2_CODE void invert_medians(Vector* columns, Vector top, Vector modulus
 }
 
 /// Of the transform `previous`: sums along z where x = y = 0, then along y where x = 0, then along x.
+template <bool narrow>
 VOXKIT_AVX2_CODE void invert_previous(Vector* columns, Vector top, Vector modulus) {
   const Vector bottom = _mm256_set1_epi64x(0xffff);
   Vector edge = _mm256_and_si256(columns[0], bottom);
-  edge = add_modulo(edge, below_z(edge), top, modulus);
-  edge = add_modulo(edge, _mm256_permute2x128_si256(edge, edge, 0x08), top, modulus);
+  edge = add_modulo<narrow>(edge, below_z(edge), top, modulus);
+  edge = add_modulo<narrow>(edge, _mm256_permute2x128_si256(edge, edge, 0x08), top, modulus);
   Vector face = _mm256_blendv_epi8(columns[0], edge, bottom);
-  face = add_modulo(face, below_y(face), top, modulus);
-  face = add_modulo(face, _mm256_slli_epi64(face, 32), top, modulus);
+  face = add_modulo<narrow>(face, below_y(face), top, modulus);
+  face = add_modulo<narrow>(face, _mm256_slli_epi64(face, 32), top, modulus);
   columns[0] = face;
-  for (int x = 1; x < 4; ++x) columns[x] = add_modulo(columns[x - 1], columns[x], top, modulus);
+  for (int x = 1; x < 4; ++x) columns[x] = add_modulo<narrow>(columns[x - 1], columns[x], top, modulus);
 }
 
 /// The upward distances that codes folded modulo stand for.
@@ -150,6 +193,23 @@ VOXKIT_AVX2_CODE Vector upward(Vector code, Vector top) {
   const Vector half = _mm256_srli_epi16(code, 1);
   const Vector odd = _mm256_sub_epi16(_mm256_setzero_si256(), _mm256_and_si256(code, _mm256_set1_epi16(1)));
   return _mm256_blendv_epi8(half, _mm256_sub_epi16(top, half), odd);
+}
+
+/// Residuals of columns become voxels, less the least one.
+template <bool narrow>
+VOXKIT_AVX2_CODE void invert_columns(Transform transform, Vector* columns, Vector top, Vector modulus) {
+  switch (transform) {
+    case Transform::none:
+      break;
+    case Transform::previous:
+      for (int x = 0; x < 4; ++x) columns[x] = upward(columns[x], top);
+      return invert_previous<narrow>(columns, top, modulus);
+    case Transform::median_modulo:
+      for (int x = 0; x < 4; ++x) columns[x] = upward(columns[x], top);
+      return invert_medians<false, narrow>(columns, top, modulus);
+    case Transform::median_bounded:
+      return invert_medians<true, narrow>(columns, top, modulus);
+  }
 }
 
 /// Octants as `unpack` makes them become columns.
@@ -226,20 +286,11 @@ VOXKIT_AVX2_CODE void store_columns(const Vector* columns, Vector min, uint16_t*
       _mm256_max_epu16(_mm256_max_epu16(columns[0], columns[1]), _mm256_max_epu16(columns[2], columns[3]));
   const Vector over = _mm256_subs_epu16(largest, top);
   if (!_mm256_testz_si256(over, over)) return false;
-  switch (static_cast<Transform>(head >> 6)) {
-    case Transform::none:
-      break;
-    case Transform::previous:
-      for (Vector& column : columns) column = upward(column, top);
-      invert_previous(columns, top, modulus);
-      break;
-    case Transform::median_modulo:
-      for (Vector& column : columns) column = upward(column, top);
-      invert_medians<false>(columns, top, modulus);
-      break;
-    case Transform::median_bounded:
-      invert_medians<true>(columns, top, modulus);
-      break;
+  const auto transform = static_cast<Transform>(head >> 6);
+  if (static_cast<uint32_t>(range.max - range.min) < narrow_tops) {
+    invert_columns<true>(transform, columns, top, modulus);
+  } else {
+    invert_columns<false>(transform, columns, top, modulus);
   }
   store_columns(columns, _mm256_set1_epi16(static_cast<short>(range.min)), voxels);
   return true;

@@ -3,6 +3,8 @@
 
 #include <gtest/gtest.h>
 
+#include <algorithm>
+#include <bit>
 #include <random>
 
 #include "libvq/rbuc_avx2.h"
@@ -184,6 +186,38 @@ TEST(Rbuc, PlainCodes) {
       for (const BrickRange wrong : {narrow, low})
         for (const Decoded& decoded : decode_all(bytes, bits, wrong)) EXPECT_FALSE(decoded.valid) << bits;
     }
+  }
+}
+
+/// All decoders agree on any residuals, whatever the greatest one: vector code has shorter ways for small
+/// ones.
+TEST(Rbuc, DecodersAgreeOnEveryExtent) {
+  std::mt19937 random(7);
+  for (int i = 0; i < 20000; ++i) {
+    constexpr uint32_t edges[] = {1, 2, 255, 16383, 32767, 65535};
+    auto top = static_cast<uint32_t>(edges[random() % 6] + random() % 5 - 2);
+    if (i % 2) top = static_cast<uint32_t>(random() >> (16 + random() % 16));
+    top = std::clamp(top, 1u, 65535u);
+    const int c1 = std::bit_width(top), c2 = std::bit_width(static_cast<unsigned>(c1));
+    std::vector<std::byte> bytes(1 + static_cast<size_t>(c2 + 8 * c1) + 8);
+    bytes[0] = static_cast<std::byte>(static_cast<unsigned>(c2) | random() % 4 << 6);
+    for (size_t octant = 0; octant < 8; ++octant)
+      store_bits(&bytes[1], octant * static_cast<size_t>(c2), static_cast<uint32_t>(c1));
+    const bool extreme = random() % 2;
+    for (size_t k = 0; k < 64; ++k) {
+      const auto residual = static_cast<uint32_t>(random()) % (top + 1);
+      store_bits(&bytes[1 + static_cast<size_t>(c2)], k * static_cast<size_t>(c1),
+                 !extreme       ? residual
+                 : residual % 3 ? top - std::min(top, residual % 7)
+                                : residual % 5);
+    }
+    bytes.resize(bytes.size() - 8);
+    const auto min = static_cast<uint16_t>(random() % (65536 - top));
+    const BrickRange range{min, static_cast<uint16_t>(min + top)};
+    const auto* const data = reinterpret_cast<const uint8_t*>(bytes.data());
+    const auto all = decode_all({data, bytes.size()}, 16, range);
+    EXPECT_TRUE(all[0].valid);
+    for (const Decoded& decoded : all) ASSERT_EQ(decoded, all[0]) << i << ", top " << top;
   }
 }
 
