@@ -101,6 +101,14 @@ class PartWriter {
   size_t macro_blocks_ = 0;
 };
 
+std::vector<PlannedBlock> plan_of(const MacroColors& colors, const Fitter& fitter, Endpoints endpoints,
+                                  const BlockOptions& options) {
+  if (options.weight_bits > 0)
+    return merge_greedily(colors, fitter, endpoints, options.weight_bits, options.weight_bits);
+  if (options.effort > 1) return parse_optimally(colors, fitter, endpoints, options.effort);
+  return merge_greedily(colors, fitter, endpoints, 0, most_weight_bits);
+}
+
 }  // namespace
 
 Endpoints endpoints_for(double threshold) {
@@ -119,11 +127,8 @@ EncodedPart encode_part(std::span<const Rgb> colors, const BlockOptions& options
     const size_t first = m * macro_block_colors;
     const auto own = colors.subspan(first, std::min<size_t>(macro_block_colors, colors.size() - first));
     const MacroColors macro(own);
-    const Fitter fitter(macro, endpoints, allowed);
-    const std::vector<PlannedBlock> plan =
-        options.weight_bits > 0
-            ? merge_greedily(macro, fitter, endpoints, options.weight_bits, options.weight_bits)
-            : merge_greedily(macro, fitter, endpoints, 0, most_weight_bits);
+    const Fitter fitter(macro, endpoints, allowed, options.effort);
+    const std::vector<PlannedBlock> plan = plan_of(macro, fitter, endpoints, options);
     uint64_t cost = 0;
     for (const PlannedBlock& block : plan)
       cost += block_cost(block.last - block.first, block.bits, endpoints);

@@ -13,7 +13,7 @@ namespace voxkit::color {
 struct BlockOptions {
   double threshold = 9.56;  ///< greatest RGB distance of a decoded colour, 0 or more
   int weight_bits = 0;      ///< 1 to 4: that many for all blocks (fws); 0: what suits each block (vws)
-  int effort = 1;           ///< 1: the paper's greedy merging; 2 to 9: optimal parsing, ever wider
+  int effort = 3;           ///< 1: the paper's greedy merging; 2 to 9: optimal parsing, with ever more tries
 };
 
 /// Endpoints with which any colour can be coded within a threshold: 5 and 6 bits are off by up to 6.1.

@@ -147,25 +147,33 @@ Fit Fitter::fit_line(uint32_t first, uint32_t last, int bits) const {
   const auto center = static_cast<float>(line.mean[0] * line.axis[0] + line.mean[1] * line.axis[1] +
                                          line.mean[2] * line.axis[2]);
   const float lo = extent.least - center, hi = extent.most - center;
-  const auto try_ends = [&](float inset) {
-    const auto end = [&](float t) {
-      std::array<float, 3> color;
-      for (size_t c = 0; c < 3; ++c) color[c] = static_cast<float>(line.mean[c]) + t * line.axis[c];
-      return quantised(color);
-    };
-    Fit fit;
-    fit.a = end(lo + inset);
-    fit.b = end(hi - inset);
-    const Distances d = kernels.distances(run, floats(fit.a), floats(fit.b), most, allowed_, nullptr);
-    fit.most_squared = d.most;
-    fit.squared_error = d.sum;
-    fit.feasible = d.most <= allowed_;
-    if (fit.feasible && (!best.feasible || fit.squared_error < best.squared_error)) best = fit;
+  // Ends may lie inside of the outermost colours, in half cells: 1 gives the least greatest error where
+  // colours lie anywhere between the ends, 0 where they lie near these. The first that is feasible is taken.
+  constexpr std::array<std::array<float, 2>, 11> insets = {{{1, 1},
+                                                            {0, 0},
+                                                            {0.5f, 0.5f},
+                                                            {0.75f, 0.75f},
+                                                            {0.25f, 0.25f},
+                                                            {1, 0.5f},
+                                                            {0.5f, 1},
+                                                            {1.4f, 1.4f},
+                                                            {0, 0.5f},
+                                                            {0.5f, 0},
+                                                            {1, 0}}};
+  const float half_cell = (hi - lo) / static_cast<float>(2 * (most + 1));
+  const auto end = [&](float t) {
+    std::array<float, 3> color;
+    for (size_t c = 0; c < 3; ++c) color[c] = static_cast<float>(line.mean[c]) + t * line.axis[c];
+    return quantised(color);
   };
-  // Half a cell inside: the least greatest error where colours lie anywhere between the ends. At the ends:
-  // where they lie near these.
-  try_ends((hi - lo) / static_cast<float>(2 * (most + 1)));
-  if (!best.feasible) try_ends(0);
+  for (size_t i = 0; i < static_cast<size_t>(tries_) && !best.feasible; ++i) {
+    best.a = end(lo + insets[i][0] * half_cell);
+    best.b = end(hi - insets[i][1] * half_cell);
+    const Distances d = kernels.distances(run, floats(best.a), floats(best.b), most, allowed_, nullptr);
+    best.most_squared = d.most;
+    best.squared_error = d.sum;
+    best.feasible = d.most <= allowed_;
+  }
   return best;
 }
 

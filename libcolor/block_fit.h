@@ -43,8 +43,9 @@ struct Fit {
 class Fitter {
  public:
   /// `allowed`: the greatest squared RGB distance that any decoded colour may have.
-  Fitter(const MacroColors& colors, Endpoints endpoints, uint32_t allowed)
-      : colors_(colors), endpoints_(endpoints), allowed_(allowed) {}
+  /// `effort`, 1 to 9: how many pairs of ends are tried.
+  Fitter(const MacroColors& colors, Endpoints endpoints, uint32_t allowed, int effort)
+      : colors_(colors), endpoints_(endpoints), allowed_(allowed), tries_(effort + 1) {}
   /// The colours first .. last, half open, with `bits` bits a weight, 0 to 4.
   Fit fit(uint32_t first, uint32_t last, int bits) const;
   /// The weights of a fit with at least one bit, in order.
@@ -58,6 +59,7 @@ class Fitter {
   const MacroColors& colors_;
   Endpoints endpoints_;
   uint32_t allowed_;
+  int tries_;
 };
 
 }  // namespace voxkit::color

@@ -27,4 +27,10 @@ inline uint64_t block_cost(uint32_t colors, int bits, Endpoints endpoints) {
 std::vector<PlannedBlock> merge_greedily(const MacroColors& colors, const Fitter& fitter, Endpoints endpoints,
                                          int least_bits, int most_bits);
 
+/// For weights of variable size, the cheapest blocks there are, as far as is tried: by dynamic programming
+/// over the blocks without weights that greedy merging finds. `effort`, 2 to 9: how many ends of a block are
+/// tried.
+std::vector<PlannedBlock> parse_optimally(const MacroColors& colors, const Fitter& fitter,
+                                          Endpoints endpoints, int effort);
+
 }  // namespace voxkit::color

@@ -30,7 +30,7 @@ struct Options {
   ColorCodec codec = ColorCodec::vws;
   double threshold = 9.56;  ///< of fws and vws: greatest distance of a decoded colour, in RGB of 0 to 255
   int weight_bits = 3;      ///< of fws: 1 to 4
-  int effort = 1;           ///< of fws and vws: 1: the paper's greedy merging; up to 9: smaller, slower
+  int effort = 3;           ///< of fws and vws: 1: the paper's greedy merging; up to 9: smaller, slower
   Colors colors = Colors::leaf;
   Counts counts = Counts::node;
 };

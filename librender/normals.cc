@@ -22,6 +22,30 @@ const std::array<std::array<float, 2>, 8> circle = [] {
   return points;
 }();
 
+/// The same where a surface is so steep that all neighbours are far: from the nearer one of both along each
+/// axis, which is the one on this surface. 0 where even that is too far.
+vec3 steep_area(const Surface& surface, int x, int y, int step) {
+  const Surface::Point& centre = surface(x, y);
+  constexpr float steepest = 32;  // depth over width
+  const float reach = steepest * static_cast<float>(step) * surface.pixel(centre);
+  const auto nearer = [&](int across, int down) {
+    vec3 best(0);
+    float least = reach * reach;
+    for (const int sign : {1, -1}) {
+      const int sx = x + sign * across * step, sy = y + sign * down * step;
+      if (!surface.inside(sx, sy) || !Surface::hit(surface(sx, sy))) continue;
+      const vec3 to = surface(sx, sy).at - centre.at;
+      if (glm::dot(to, to) >= least) continue;
+      least = glm::dot(to, to);
+      best = static_cast<float>(sign) * to;
+    }
+    return best;
+  };
+  const vec3 area = glm::cross(nearer(1, 0), nearer(0, 1));
+  const float length = glm::length(area);
+  return length > 0 ? area / length : area;
+}
+
 /// The areas of the polygons through samples on circles around a pixel, as a vector towards the viewer:
 /// whatever steps lie within a circle, its area is that of the slope across them. The circles grow until
 /// about the size of a voxel is covered; samples farther off belong to something else.
@@ -47,6 +71,7 @@ vec3 area_around(const Surface& surface, int x, int y) {
     }
   }
   sum /= radius * radius * pixel * pixel;
+  if (sum == vec3(0)) sum = steep_area(surface, x, y, whole_pixels(step));
   return glm::dot(sum, centre.at) > 0 ? -sum : sum;
 }
 

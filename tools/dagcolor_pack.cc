@@ -39,7 +39,7 @@ void declare(CommandLine& line, Options& o) {
   line.option("--weight-bits", "B", "Of fws: bits of a weight, 1 to 4 (3)",
               integer(o.encoder.weight_bits, 1, color::most_weight_bits));
   line.option("--effort", "N",
-              "Of blocks: 1: greedy merging, as published; up to 9: smaller files, slower (1)",
+              "Of blocks: 1: greedy merging, as published; up to 9: smaller files, slower (3)",
               integer(o.encoder.effort, 1, 9));
   line.option("--colors", "WHICH", "leaf: those of voxels; all: of all nodes, too (leaf)",
               one_of(o.colors, {"leaf", "all"}));

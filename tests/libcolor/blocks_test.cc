@@ -43,6 +43,61 @@ TEST(Blocks, NoColorIsFurtherThanTheThreshold) {
       }
 }
 
+TEST(Blocks, OptimalParsingHoldsTheBoundAndIsNeverLarger) {
+  for (const double threshold : {0.5, 4.0, 9.56, 25.5})
+    for (const ColorCase& c : color_cases(20000, 7)) {
+      SCOPED_TRACE(testing::Message() << c.name << ", " << threshold);
+      uint64_t before = encode_part(c.colors, {threshold, 0, 1}).bytes.size();
+      for (const int effort : {2, 3, 9}) {
+        const BlockOptions options{threshold, 0, effort};
+        const EncodedPart part = encode_part(c.colors, options);
+        EXPECT_LE(part.bytes.size(), before) << effort;
+        const PartView view = view_of(part, c.colors.size(), options);
+        for (size_t i = 0; i < c.colors.size(); ++i)
+          ASSERT_LE(squared_distance(c.colors[i], view.color(static_cast<uint32_t>(i))),
+                    threshold * threshold);
+      }
+    }
+}
+
+/// All cuts of a few colours, one by one.
+uint64_t cheapest_cut(const MacroColors& colors, const Fitter& fitter, Endpoints endpoints, uint32_t first,
+                      std::vector<uint64_t>& known) {
+  if (first == colors.size()) return 0;
+  uint64_t& best = known[first];
+  if (best != 0) return best;
+  best = ~uint64_t{0};
+  for (uint32_t last = first + 1; last <= colors.size(); ++last)
+    for (int bits = 0; bits <= most_weight_bits; ++bits)
+      if (fitter.fit(first, last, bits).feasible)
+        best = std::min(best, block_cost(last - first, bits, endpoints) +
+                                  cheapest_cut(colors, fitter, endpoints, last, known));
+  return best;
+}
+
+TEST(Blocks, ParsingIsCloseToTheBestCut) {
+  uint64_t best = 0, found = 0, greedy = 0;
+  for (uint64_t seed = 10; seed < 20; ++seed)
+    for (const ColorCase& c : color_cases(80, seed)) {
+      const MacroColors colors(c.colors);
+      const Fitter fitter(colors, Endpoints::rgb565, 91, 3);
+      const auto cost_of = [&](const std::vector<PlannedBlock>& plan) {
+        uint64_t cost = 0;
+        for (const PlannedBlock& b : plan) cost += block_cost(b.last - b.first, b.bits, Endpoints::rgb565);
+        return cost;
+      };
+      std::vector<uint64_t> known(c.colors.size());
+      const uint64_t least = cheapest_cut(colors, fitter, Endpoints::rgb565, 0, known);
+      const uint64_t own = cost_of(parse_optimally(colors, fitter, Endpoints::rgb565, 9));
+      EXPECT_GE(own, least);
+      best += least;
+      found += own;
+      greedy += cost_of(merge_greedily(colors, fitter, Endpoints::rgb565, 0, most_weight_bits));
+    }
+  EXPECT_LT(static_cast<double>(found), 1.05 * static_cast<double>(best));
+  EXPECT_LT(found, greedy);
+}
+
 TEST(Blocks, NoiseCostsHardlyMoreThanPlainColors) {
   for (const size_t size : {size_t{20000}, size_t{100000}}) {
     const auto noise = color_cases(size, 2)[1].colors;
@@ -53,7 +108,7 @@ TEST(Blocks, NoiseCostsHardlyMoreThanPlainColors) {
 }
 
 TEST(Blocks, MacroBlocksEndWhereTheyMust) {
-  for (const size_t size : {size_t{3}, size_t{16383}, size_t{16384}, size_t{16385}, size_t{32768}}) {
+  for (const size_t size : {size_t{3}, size_t{16383}, size_t{16384}, size_t{16387}, size_t{32768}}) {
     std::vector<Rgb> colors(size, Rgb{17, 99, 200});
     const BlockOptions options;
     const EncodedPart part = encode_part(colors, options);
