@@ -9,6 +9,7 @@
 #include <utility>
 
 #include "formats/mesh_parts.h"
+#include "formats/mesh_ply.h"
 #include "formats/module.h"
 
 namespace voxkit {
@@ -32,6 +33,13 @@ float within_one(float value) {
 
 void bring_into_range(glm::vec4& color) {
   for (int c = 0; c < 4; ++c) color[c] = within_one(color[c]);
+}
+
+Result<MeshParts> read_parts(const std::string& path, Context& ctx) {
+  if (has_ending(path, ".ply")) return read_ply(path, ctx);
+  auto table = load_module(module_folder(), {"mesh", "reading this mesh", "libassimp-dev"});
+  if (!table) return fail(table.error().code, path, table.error().what);
+  return (*table)->read_mesh(path, ctx);
 }
 
 }  // namespace
@@ -128,9 +136,7 @@ Status load_textures(MeshParts& parts, const std::string& path, Context& ctx) {
 
 Result<Mesh> read_mesh(const std::string& path, Context& ctx) {
   if (!is_mesh_name(path)) return bad_input(path, "not a mesh: expected .obj, .gltf, .glb or .ply");
-  auto table = load_module(module_folder(), {"mesh", "reading meshes", "libassimp-dev"});
-  if (!table) return fail(table.error().code, path, table.error().what);
-  VOX_TRY(MeshParts parts, (*table)->read_mesh(path, ctx));
+  VOX_TRY(MeshParts parts, read_parts(path, ctx));
   VOX_CHECK(check_mesh(parts.mesh, path));
   VOX_CHECK(load_textures(parts, path, ctx));
   return std::move(parts.mesh);

@@ -48,7 +48,7 @@ struct Mesh {
   std::vector<MeshTriangle> triangles;  ///< all of them have an area
   std::vector<MeshMaterial> materials;
   std::vector<Texture> textures;
-  MemoryHold memory;
+  std::vector<MemoryHold> memory;
 };
 
 /// Whether a name ends like a mesh: .obj, .gltf, .glb or .ply.

@@ -1,4 +1,4 @@
-// Meshes by assimp: .obj, .gltf, .glb and .ply files.
+// Meshes by assimp: .obj, .gltf and .glb files.
 #include <assimp/GltfMaterial.h>
 #include <assimp/config.h>
 #include <assimp/importerdesc.h>
@@ -12,9 +12,11 @@
 #include <cstring>
 #include <glm/mat3x3.hpp>
 #include <memory>
+#include <optional>
 #include <string_view>
 #include <utility>
 
+#include "formats/mesh_gltf.h"
 #include "formats/mesh_io.h"
 #include "formats/mesh_parts.h"
 #include "formats/module.h"
@@ -118,6 +120,7 @@ struct ReadMaterial {
   MeshMaterial material;
   MeshParts::Maps maps;
   unsigned uv_channel = 0;
+  std::optional<UvTransform> transform;
 };
 
 Result<ReadMaterial> read_material(const aiScene& scene, const aiMaterial& in, const Conventions& use,
@@ -154,25 +157,41 @@ Result<ReadMaterial> read_material(const aiScene& scene, const aiMaterial& in, c
   return out;
 }
 
-Status append(const Placed& placed, unsigned uv_channel, const Conventions& use, const std::string& path,
-              Mesh& out) {
+/// Texture coordinates from the top left, turned about there.
+glm::vec2 transformed(glm::dvec2 uv, const std::optional<UvTransform>& transform) {
+  if (!transform) return uv;
+  const double c = std::cos(transform->rotation), s = std::sin(transform->rotation);
+  uv *= glm::dvec2(transform->scale[0], transform->scale[1]);
+  return glm::dvec2(c * uv.x + s * uv.y + transform->offset[0], c * uv.y - s * uv.x + transform->offset[1]);
+}
+
+Status append(const Placed& placed, const ReadMaterial& material, const Conventions& use,
+              const std::string& path, Mesh& out) {
   const aiMesh& in = *placed.mesh;
   const auto first = static_cast<uint32_t>(out.positions.size());
   for (unsigned i = 0; i < in.mNumVertices; ++i) {
     const aiVector3D& p = in.mVertices[i];
     out.positions.push_back(placed.linear * glm::dvec3(p.x, p.y, p.z) + placed.shift);
   }
+  unsigned uv_channel = material.uv_channel;
   if (uv_channel >= AI_MAX_NUMBER_OF_TEXTURECOORDS || !in.HasTextureCoords(uv_channel)) uv_channel = 0;
   if (in.HasTextureCoords(uv_channel)) {
     out.uvs.resize(first);
     for (unsigned i = 0; i < in.mNumVertices; ++i) {
       const aiVector3D& uv = in.mTextureCoords[uv_channel][i];
-      out.uvs.push_back({uv.x, 1 - uv.y});  // assimp counts from the bottom, whatever the file does
+      // assimp counts from the bottom, whatever the file does.
+      out.uvs.push_back(transformed({uv.x, 1 - uv.y}, material.transform));
     }
   }
   if (in.HasVertexColors(0)) {
+    // assimp leaves alpha at 0 where a glTF file has colours without it.
+    const aiColor4D *colors = in.mColors[0], *end = colors + in.mNumVertices;
+    const bool has_alpha = std::any_of(colors, end, [](const aiColor4D& c) { return c.a != 0; });
     out.colors.resize(first, glm::vec4(1));
-    for (unsigned i = 0; i < in.mNumVertices; ++i) out.colors.push_back(color_of(in.mColors[0][i], use));
+    for (; colors != end; ++colors) {
+      out.colors.push_back(color_of(*colors, use));
+      if (!has_alpha) out.colors.back().a = 1;
+    }
   }
   for (unsigned i = 0; i < in.mNumFaces; ++i) {
     const aiFace& face = in.mFaces[i];
@@ -191,8 +210,9 @@ Status append(const Placed& placed, unsigned uv_channel, const Conventions& use,
   return {};
 }
 
-Result<MeshParts> convert(const aiScene& scene, const Conventions& use, const std::string& path,
-                          Context& ctx) {
+/// `transforms` are of the first materials.
+Result<MeshParts> convert(const aiScene& scene, const Conventions& use,
+                          const std::vector<UvTransform>& transforms, const std::string& path, Context& ctx) {
   MeshParts parts;
   VOX_TRY(const auto placed, place_meshes(scene, path));
   uint64_t vertices = 0, triangles = 0;
@@ -209,23 +229,29 @@ Result<MeshParts> convert(const aiScene& scene, const Conventions& use, const st
   Mesh& mesh = parts.mesh;
   const uint64_t vertex_bytes =
       sizeof(glm::dvec3) + has_uvs * sizeof(glm::vec2) + has_colors * sizeof(glm::vec4);
-  VOX_TRY(mesh.memory,
+  VOX_TRY(MemoryHold memory,
           MemoryHold::take(vertices * vertex_bytes + triangles * sizeof(MeshTriangle), "the mesh", ctx));
+  mesh.memory.push_back(std::move(memory));
   mesh.positions.reserve(vertices);
   if (has_uvs) mesh.uvs.reserve(vertices);
   if (has_colors) mesh.colors.reserve(vertices);
   mesh.triangles.reserve(triangles);
 
-  std::vector<unsigned> uv_channels;
+  std::vector<ReadMaterial> materials;
   for (unsigned i = 0; i < scene.mNumMaterials; ++i) {
     VOX_TRY(ReadMaterial read, read_material(scene, *scene.mMaterials[i], use, path));
-    mesh.materials.push_back(std::move(read.material));
+    if (i < transforms.size()) {
+      read.transform = transforms[i];
+      if (transforms[i].uv_channel >= 0) read.uv_channel = static_cast<unsigned>(transforms[i].uv_channel);
+    }
+    mesh.materials.push_back(read.material);
     parts.maps.push_back(std::move(read.maps));
-    uv_channels.push_back(read.uv_channel);
+    materials.push_back(std::move(read));
   }
   for (const Placed& p : placed) {
-    const unsigned material = p.mesh->mMaterialIndex;
-    VOX_CHECK(append(p, material < uv_channels.size() ? uv_channels[material] : 0, use, path, mesh));
+    if (p.mesh->mMaterialIndex >= materials.size())
+      return bad_input(path, "corrupt mesh: a material that is not there");
+    VOX_CHECK(append(p, materials[p.mesh->mMaterialIndex], use, path, mesh));
   }
   if (has_uvs) mesh.uvs.resize(vertices);
   if (has_colors) mesh.colors.resize(vertices, glm::vec4(1));
@@ -244,12 +270,15 @@ void keep_readers(Assimp::Importer& importer) {
   for (size_t i = importer.GetImporterCount(); i-- > 0;) {
     const aiImporterDesc* about = importer.GetImporterInfo(i);
     const std::string_view endings = about && about->mFileExtensions ? about->mFileExtensions : "";
-    if (endings != "obj" && endings != "ply" && endings != "gltf glb")
-      importer.UnregisterLoader(importer.GetImporter(i));
+    if (endings != "obj" && endings != "gltf glb") importer.UnregisterLoader(importer.GetImporter(i));
   }
 }
 
 Result<MeshParts> read(const std::string& path, Context& ctx) {
+  std::vector<UvTransform> transforms;
+  if (!has_ending(path, ".obj")) {
+    VOX_TRY(transforms, check_gltf(path, ctx));
+  }
   MeshFiles files(ctx);
   Assimp::Importer importer;
   keep_readers(importer);
@@ -257,7 +286,7 @@ Result<MeshParts> read(const std::string& path, Context& ctx) {
   importer.SetPropertyInteger(AI_CONFIG_PP_SBP_REMOVE, aiPrimitiveType_POINT | aiPrimitiveType_LINE);
   const aiScene* scene = importer.ReadFile(path, aiProcess_Triangulate | aiProcess_SortByPType);
   VOX_CHECK(files.status);
-  const Conventions use{.linear_colors = !has_ending(path, ".obj") && !has_ending(path, ".ply"),
+  const Conventions use{.linear_colors = !has_ending(path, ".obj"),
                         .alpha_from_texture = has_ending(path, ".obj")};
   // assimp goes on without a material library, but tries the mesh's name with the ending .mtl first.
   const auto is_library = [](const std::string& name) { return has_ending(name, ".mtl"); };
@@ -267,7 +296,7 @@ Result<MeshParts> read(const std::string& path, Context& ctx) {
       return bad_input(path,
                        fmt::format("{} is missing, which the mesh needs", name.substr(name.rfind('/') + 1)));
   if (!scene || !scene->mRootNode) return bad_input(path, "not a mesh: " + reason(importer.GetErrorString()));
-  return convert(*scene, use, path, ctx);
+  return convert(*scene, use, transforms, path, ctx);
 }
 
 Result<MeshParts> read_file(const std::string& path, Context& ctx) {

@@ -1,0 +1,127 @@
+// PLY files, which our own reader reads.
+#include <gtest/gtest.h>
+
+#include "formats/image.h"
+#include "formats/mesh.h"
+#include "formats/mesh_ply.h"
+#include "formats/module.h"
+#include "tests/formats/file_format_test.h"
+#include "tests/formats/mesh_files.h"
+
+namespace voxkit {
+namespace {
+
+class MeshPlyTest : public FileFormatTest {
+ protected:
+  Mesh read(const std::string& content) {
+    auto parts = read_ply(put("a.ply", content), ctx_);
+    EXPECT_TRUE(parts) << parts.error().what;
+    return parts ? std::move(parts->mesh) : Mesh{};
+  }
+  void expect_error(const std::string& content, const std::string& part, ErrorCode code = ErrorCode::input) {
+    const auto mesh = read_mesh(put("a.ply", content), ctx_);
+    ASSERT_FALSE(mesh) << "accepted; expected an error with: " << part;
+    EXPECT_EQ(mesh.error().code, code);
+    EXPECT_NE(mesh.error().what.find(part), std::string::npos) << mesh.error().what;
+  }
+};
+
+TEST_F(MeshPlyTest, EveryTypeInEitherOrder) {
+  const std::string properties =
+      "element vertex 3\nproperty double x\nproperty short y\nproperty uint z\nproperty int8 pad\n"
+      "property ushort green\nproperty uint8 red\nproperty float blue\nproperty float alpha\n"
+      "element other 2\nproperty list uint16 double stuff\nproperty char more\n"
+      "element face 1\nproperty uchar flag\nproperty list ushort uint32 vertex_index\nend_header\n";
+  for (const bool big : {false, true}) {
+    std::string data;
+    const auto add = [&]<class T>(T value) { data += sample_text(std::vector<T>{value}, big); };
+    for (int i = 0; i < 3; ++i) {
+      add(1.5 * i), add(int16_t(-300 * i * i)), add(uint32_t(70000 + i)), add(int8_t(-1));
+      add(uint16_t(65535)), add(uint8_t(0)), add(1.0f), add(0.25f);
+    }
+    add(uint16_t(2)), add(1.0), add(2.0), add(int8_t(3)), add(uint16_t(0)), add(int8_t(4));
+    add(uint8_t(9)), add(uint16_t(3)), add(uint32_t(2)), add(uint32_t(0)), add(uint32_t(1));
+    const Mesh mesh =
+        read(fmt::format("ply\nformat binary_{}_endian 1.0\n", big ? "big" : "little") + properties + data);
+    ASSERT_EQ(mesh.positions.size(), 3u);
+    EXPECT_EQ(mesh.positions[2], glm::dvec3(3, -1200, 70002));
+    EXPECT_EQ(mesh.colors[1], glm::vec4(0, 1, 1, 0.25f));
+    ASSERT_EQ(mesh.triangles.size(), 1u);
+    EXPECT_EQ(mesh.triangles[0].vertices, (std::array<uint32_t, 3>{2, 0, 1}));
+  }
+}
+
+TEST_F(MeshPlyTest, PolygonsAndLineEnds) {
+  const Mesh mesh = read(
+      "ply\r\nformat ascii 1.0\r\ncomment by hand\r\nelement vertex 5\r\nproperty float x\r\nproperty float "
+      "y\r\n"
+      "property float z\r\nelement face 2\r\nproperty list uchar int vertex_indices\r\nend_header\r\n"
+      "0 0 0\r\n1 0 0\r\n1.5 +1 0\r\n1 2e0 0\r\n0 2 -0\r\n5 0 1 2 3 4\r\n2 0 1");
+  ASSERT_EQ(mesh.triangles.size(), 3u);
+  EXPECT_EQ(mesh.triangles[2].vertices, (std::array<uint32_t, 3>{0, 3, 4}));
+  EXPECT_EQ(mesh.positions[2], glm::dvec3(1.5, 1, 0));
+}
+
+TEST_F(MeshPlyTest, TexturesOfMeshLab) {
+  if (!load_module(module_folder(), {"image_stack", "reading images", ""})) GTEST_SKIP() << "no OpenImageIO";
+  auto image = Image::create(2, 1, 1, SampleType::u8, ctx_);
+  image->row(0)[0] = 10, image->row(0)[1] = 200;
+  ASSERT_TRUE(write_image(path("two words.png"), *image, true));
+  const std::string head =
+      "ply\nformat ascii 1.0\ncomment TextureFile two words.png\nelement vertex 4\nproperty float x\n"
+      "property float y\nproperty float z\n";
+  // Coordinates of vertices, and of the corners of faces.
+  auto mesh = read_mesh(put("a.ply", head + "property float s\nproperty float t\nelement face 1\n"
+                                            "property list uchar int vertex_indices\nend_header\n"
+                                            "0 0 0 0 0\n1 0 0 1 0\n1 1 0 1 1\n0 1 0 0 1\n4 0 1 2 3\n"),
+                        ctx_);
+  ASSERT_TRUE(mesh) << mesh.error().what;
+  ASSERT_EQ(mesh->textures.size(), 1u);
+  EXPECT_EQ(mesh->textures[0].data()[4], 200);
+  EXPECT_EQ(mesh->uvs[2], glm::vec2(1, 0));  // from the top
+  mesh = read_mesh(
+      put("a.ply", head + "element face 2\nproperty list uchar int vertex_indices\n"
+                          "property list uchar float texcoord\nend_header\n"
+                          "0 0 0\n1 0 0\n1 1 0\n0 1 0\n3 0 1 2 6 0 0 1 0 1 1\n3 0 2 3 6 0.5 0.25 1 1 0 1\n"),
+      ctx_);
+  ASSERT_TRUE(mesh) << mesh.error().what;
+  ASSERT_EQ(mesh->triangles.size(), 2u);
+  const uint32_t corner = mesh->triangles[1].vertices[0];
+  EXPECT_EQ(mesh->uvs[corner], glm::vec2(0.5f, 0.75f));
+  EXPECT_EQ(mesh->positions[corner], glm::dvec3(0, 0, 0));
+  EXPECT_EQ(mesh->uvs[mesh->triangles[0].vertices[0]], glm::vec2(0, 1));
+}
+
+TEST_F(MeshPlyTest, Refusals) {
+  const auto file = [](const std::string& vertex, const std::string& face, const std::string& data) {
+    return "ply\nformat ascii 1.0\nelement vertex " + vertex +
+           "\nproperty float x\nproperty float y\nproperty float z\n" + face + "end_header\n" + data;
+  };
+  const std::string faces = "element face 1\nproperty list uchar int vertex_indices\n";
+  const std::string points = "0 0 0\n1 0 0\n0 1 0\n";
+  expect_error(file("3", "", points), "no mesh");
+  expect_error(file("3", faces, points + "3 0 1 3\n"), "vertex 3: expected one below 3");
+  expect_error(file("3", faces, points + "3 0 1 -1\n"), "expected one below 3");
+  expect_error(file("3", faces, points + "3 0 1 1\n"), "without triangles");
+  expect_error(file("3", faces, points + "255 0 1 2\n"), "a list of 255");
+  expect_error(file("3", faces, points), "expected further elements");
+  expect_error(file("99999999999", faces, points), "elements vertex");
+  expect_error(file("-3", faces, points), "expected the number of elements");
+  expect_error(file("3", faces, "0 0 x\n1 0 0\n0 1 0\n"), "expected a number");
+  expect_error(file("3", faces, "0 0 nan\n1 0 0\n0 1 0\n3 0 1 2\n"), "expected finite coordinates");
+  expect_error(file("3", "property string s\n" + faces, points), "expected the type of a property");
+  expect_error("ply\nformat ascii 1.0\nelement face 1\n", "expected end_header");
+  expect_error("ply\nformat EBCDIC 1.0\n", "expected the format");
+  expect_error("ply\nend_header\n", "no format");
+  expect_error("play", "not a PLY file");
+
+  std::string many = "4000 ";
+  for (int i = 0; i < 4000; ++i) many += "0 ";
+  MemoryBudget small(20 << 10);
+  ctx_.memory = &small;
+  expect_error(file("3", "element face 1\nproperty list ushort int vertex_indices\n", points + many),
+               "--max-memory", ErrorCode::limit);
+}
+
+}  // namespace
+}  // namespace voxkit

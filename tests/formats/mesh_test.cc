@@ -1,0 +1,397 @@
+// Meshes and their textures as they are read.
+#include "formats/mesh.h"
+
+#include <gtest/gtest.h>
+
+#include <cmath>
+#include <set>
+
+#include "formats/image.h"
+#include "formats/mesh_parts.h"
+#include "formats/module.h"
+#include "tests/formats/file_format_test.h"
+#include "tests/formats/mesh_files.h"
+
+namespace voxkit {
+namespace {
+
+class MeshFileTest : public FileFormatTest {
+ protected:
+  void SetUp() override {
+    FileFormatTest::SetUp();
+    if (!load_module(module_folder(), {"mesh", "reading meshes", ""})) GTEST_SKIP() << "no assimp";
+    if (!load_module(module_folder(), {"image_stack", "reading images", ""}))
+      GTEST_SKIP() << "no OpenImageIO";
+  }
+
+  Mesh read(const std::string& name, const std::string& content) {
+    auto mesh = read_mesh(put(name, content), ctx_);
+    EXPECT_TRUE(mesh) << mesh.error().what;
+    return mesh ? std::move(*mesh) : Mesh{};
+  }
+  void expect_error(const std::string& name, const std::string& content, const std::string& part,
+                    ErrorCode code = ErrorCode::input) {
+    const auto mesh = read_mesh(put(name, content), ctx_);
+    ASSERT_FALSE(mesh) << "accepted; expected an error with: " << part;
+    EXPECT_EQ(mesh.error().code, code);
+    EXPECT_NE(mesh.error().what.find(part), std::string::npos) << mesh.error().what;
+    EXPECT_EQ(mesh.error().what.find('\n'), std::string::npos) << mesh.error().what;
+  }
+  /// A picture of 2 x 2: red, green over blue, white; or with the alpha of each.
+  std::string picture(const std::string& name, const std::vector<float>& alphas = {}) {
+    const float texels[4][3] = {{255, 0, 0}, {0, 255, 0}, {0, 0, 255}, {255, 255, 255}};
+    auto image = Image::create(2, 2, alphas.empty() ? 3 : 4, SampleType::u8, ctx_);
+    float* out = image->row(0);
+    for (size_t i = 0; i < 4; ++i) {
+      out = std::copy_n(texels[i], 3, out);
+      if (!alphas.empty()) *out++ = alphas[i];
+    }
+    const Status written = write_image(path(name), *image, true);
+    EXPECT_TRUE(written) << written.error().what;
+    return get(path(name));
+  }
+  static void expect_square(const Mesh& mesh) {
+    ASSERT_EQ(mesh.triangles.size(), 2u);
+    double area = 0;
+    for (const MeshTriangle& triangle : mesh.triangles) {
+      const auto& [a, b, c] = triangle.vertices;
+      const glm::dvec3 u = mesh.positions[b] - mesh.positions[a], v = mesh.positions[c] - mesh.positions[a];
+      area += u.x * v.y - u.y * v.x;
+      // Wherever it comes from: the bottom of the picture is where y is 0.
+      for (const uint32_t vertex : triangle.vertices) {
+        EXPECT_EQ(mesh.uvs[vertex].x, mesh.positions[vertex].x);
+        EXPECT_EQ(mesh.uvs[vertex].y, 1 - mesh.positions[vertex].y);
+      }
+    }
+    EXPECT_EQ(area, 2);
+  }
+  static std::array<int, 4> texel(const Mesh& mesh, size_t texture, int64_t x, int64_t y) {
+    const uint8_t* p = mesh.textures[texture].data() + 4 * (y * mesh.textures[texture].width + x);
+    return {p[0], p[1], p[2], p[3]};
+  }
+};
+
+TEST_F(MeshFileTest, Obj) {
+  picture("wall.png");
+  put("m.mtl",
+      "newmtl wall\nKd 0.5 1 0.25\nmap_Kd wall.png\nnewmtl glass\nKd 1 1 1\nd 0.25\nnewmtl unused\nmap_Kd "
+      "none.png\n");
+  const Mesh mesh =
+      read("a.obj", obj_square("mtllib m.mtl\nusemtl wall\n") + "usemtl glass\nf 1/1 2/2 3/3\n");
+  ASSERT_EQ(mesh.triangles.size(), 3u);
+  std::set<std::string> names;
+  for (const MeshTriangle& triangle : mesh.triangles) {
+    const MeshMaterial& material = mesh.materials[triangle.material];
+    names.insert(material.name);
+    if (material.name == "wall") {
+      // sRGB becomes light.
+      EXPECT_NEAR(material.color.r, 0.21404, 1e-4);
+      EXPECT_EQ(material.color.g, 1);
+      EXPECT_EQ(material.alpha_mode, AlphaMode::opaque);
+      ASSERT_EQ(material.texture, 0);
+    } else {
+      EXPECT_EQ(material.color.a, 0.25f);
+      EXPECT_EQ(material.alpha_mode, AlphaMode::blend);
+      EXPECT_EQ(material.texture, -1);
+    }
+  }
+  EXPECT_EQ(names, (std::set<std::string>{"wall", "glass"}));
+  ASSERT_EQ(mesh.textures.size(), 1u);
+  EXPECT_EQ(texel(mesh, 0, 0, 0), (std::array<int, 4>{255, 0, 0, 255}));
+  EXPECT_EQ(texel(mesh, 0, 0, 1), (std::array<int, 4>{0, 0, 255, 255}));
+  EXPECT_FALSE(mesh.textures[0].has_alpha);
+}
+
+TEST_F(MeshFileTest, TheSameSquareOfEachFormat) {
+  expect_square(read("a.obj", obj_square()));
+  expect_square(read("a.gltf", GltfSquare{}.gltf()));
+  expect_square(read("a.glb", GltfSquare{}.glb()));
+}
+
+TEST_F(MeshFileTest, PlyColoursAreStoredValues) {
+  for (const bool binary : {false, true}) {
+    const Mesh mesh = read("a.ply", ply_triangle(binary));
+    ASSERT_EQ(mesh.triangles.size(), 1u);
+    ASSERT_EQ(mesh.colors.size(), 3u);
+    EXPECT_EQ(mesh.colors[0], glm::vec4(1, 0, 0, 1));
+    EXPECT_NEAR(mesh.colors[1].g, 0.5, 0.01);
+    EXPECT_NEAR(mesh.colors[2].b, 0.2159, 1e-3);
+    EXPECT_EQ(mesh.materials[mesh.triangles[0].material].color, glm::vec4(1));
+  }
+}
+
+TEST_F(MeshFileTest, NodesPutMeshesInTheirPlaces) {
+  GltfSquare file;
+  // Twice, and turned by 90 degrees about z under a node that moves and stretches.
+  file.nodes = R"([{"mesh":0,"translation":[10,0,0]},{"children":[2],"translation":[0,0,5],"scale":[2,2,2]},)"
+               R"({"mesh":0,"rotation":[0,0,0.70710678118,0.70710678118]}])";
+  file.scene = "[0,1]";
+  const Mesh mesh = read("a.gltf", file.gltf());
+  ASSERT_EQ(mesh.triangles.size(), 4u);
+  glm::dvec3 lo[2] = {glm::dvec3(1e9), glm::dvec3(1e9)}, hi[2] = {glm::dvec3(-1e9), glm::dvec3(-1e9)};
+  for (size_t i = 0; i < 4; ++i)
+    for (const uint32_t v : mesh.triangles[i].vertices)
+      for (int c = 0; c < 3; ++c) {
+        lo[i / 2][c] = std::min(lo[i / 2][c], mesh.positions[v][c]);
+        hi[i / 2][c] = std::max(hi[i / 2][c], mesh.positions[v][c]);
+      }
+  const glm::dvec3 want[2][2] = {{{10, 0, 0}, {11, 1, 0}}, {{-2, 0, 5}, {0, 2, 5}}};
+  for (int i = 0; i < 2; ++i)
+    for (int c = 0; c < 3; ++c) {
+      EXPECT_NEAR(lo[i][c], want[i][0][c], 1e-6) << i << c;
+      EXPECT_NEAR(hi[i][c], want[i][1][c], 1e-6) << i << c;
+    }
+}
+
+TEST_F(MeshFileTest, GltfMaterials) {
+  picture("a b.png", {255, 255, 10, 255});
+  GltfSquare file;
+  file.material =
+      R"({"pbrMetallicRoughness":{"baseColorFactor":[0.5,0.25,1,0.75],"baseColorTexture":{"index":0}},)"
+      R"("alphaMode":"MASK","alphaCutoff":0.3})";
+  file.rest = R"(,"textures":[{"source":0,"sampler":0}],"images":[{"uri":"a%20b.png"}],)"
+              R"("samplers":[{"wrapS":33648,"wrapT":33071}])";
+  const Mesh mesh = read("a.gltf", file.gltf());
+  const MeshMaterial& material = mesh.materials[mesh.triangles[0].material];
+  EXPECT_EQ(material.color, glm::vec4(0.5f, 0.25f, 1, 0.75f));  // light, as it is
+  EXPECT_EQ(material.alpha_mode, AlphaMode::mask);
+  EXPECT_EQ(material.alpha_cutoff, 0.3f);
+  EXPECT_EQ(material.wrap_u, TextureWrap::mirror);
+  EXPECT_EQ(material.wrap_v, TextureWrap::clamp);
+  ASSERT_EQ(material.texture, 0);
+  EXPECT_TRUE(mesh.textures[0].has_alpha);
+  EXPECT_EQ(texel(mesh, 0, 0, 1), (std::array<int, 4>{0, 0, 255, 10}));
+
+  file.material = R"({"alphaMode":"BLEND"})";
+  EXPECT_EQ(read("b.gltf", file.gltf()).materials[0].alpha_mode, AlphaMode::blend);
+  file.material = "{}";
+  EXPECT_EQ(read("b.gltf", file.gltf()).materials[0].alpha_mode, AlphaMode::opaque);
+}
+
+TEST_F(MeshFileTest, TransformsOfGltfTextures) {
+  picture("a.png");
+  GltfSquare file;
+  file.rest = R"(,"textures":[{"source":0}],"images":[{"uri":"a.png"}])";
+  file.material =
+      R"({"pbrMetallicRoughness":{"baseColorTexture":{"index":0,"extensions":{"KHR_texture_transform":)"
+      R"({"offset":[0.25,0.5],"scale":[2,3],"rotation":1.5707963267948966}}}}})";
+  const Mesh mesh = read("a.gltf", file.gltf());
+  for (size_t i = 0; i < mesh.positions.size(); ++i) {
+    // Stretched, turned by a quarter, moved.
+    const double u = 2 * mesh.positions[i].x, v = 3 * (1 - mesh.positions[i].y);
+    EXPECT_NEAR(mesh.uvs[i].x, v + 0.25, 1e-6);
+    EXPECT_NEAR(mesh.uvs[i].y, -u + 0.5, 1e-6);
+  }
+}
+
+TEST_F(MeshFileTest, HostileGltf) {
+  GltfSquare file;
+  const std::string glb = file.glb(), gltf = file.gltf();
+  const auto change = [](std::string text, const std::string& from, const std::string& to) {
+    const size_t at = text.find(from);
+    EXPECT_NE(at, text.npos) << from;
+    return text.replace(at, from.size(), to);
+  };
+  std::string longer = glb;
+  longer[15] = 0x74;  // 1.9 GB of text
+  expect_error("a.glb", longer, "chunk at byte 12");
+  expect_error("a.glb", glb.substr(0, glb.size() - 4), "expected " + std::to_string(glb.size()));
+  expect_error("a.glb", gltf, "not a GLB file");
+  expect_error("a.gltf", gltf.substr(0, gltf.size() / 2), "not JSON");
+  expect_error("a.gltf", "[]", "expected an object");
+  expect_error("a.gltf", change(gltf, R"("count":4)", R"("count":400000000)"),
+               "accessor 0: it leads past the end");
+  expect_error("a.gltf", change(gltf, R"("count":4)", R"("count":-4)"), "accessor 0: expected count");
+  expect_error("a.gltf", change(gltf, R"("bufferView":0)", R"("bufferView":9)"),
+               "expected the number of a buffer view");
+  expect_error("a.gltf", change(gltf, R"("byteOffset":48)", R"("byteOffset":480)"),
+               "past the end of its buffer");
+  // Zeros, where it says so: no more of them than memory.
+  const std::string zeros =
+      change(change(gltf, R"({"bufferView":0,)", "{"), R"("count":4)", R"("count":4000000000)");
+  expect_error("a.gltf", zeros, "--max-memory", ErrorCode::limit);
+  file.nodes = R"([{"mesh":0,"children":[1]},{"children":[0]}])";
+  expect_error("a.gltf", file.gltf(), "it is its own parent");
+  file.nodes = R"([{"mesh":0,"children":[0]}])";
+  expect_error("a.gltf", file.gltf(), "it is its own parent");
+  file.nodes = R"([{"mesh":0,"children":[1,1]},{}])";
+  expect_error("a.gltf", file.gltf(), "no other node has");
+}
+
+TEST_F(MeshFileTest, EveryShorterFileAndManyOthers) {
+  GltfSquare file;
+  const std::pair<const char*, std::string> files[] = {{"a.glb", file.glb()},
+                                                       {"a.gltf", file.gltf()},
+                                                       {"a.obj", obj_square("usemtl x\n")},
+                                                       {"a.ply", ply_triangle(true)},
+                                                       {"b.ply", ply_triangle(false)}};
+  const auto is_sound = [&](const std::string& name) {
+    const auto mesh = read_mesh(path(name), ctx_);
+    if (mesh) return true;
+    EXPECT_EQ(mesh.error().what.find('\n'), std::string::npos);
+    return mesh.error().code == ErrorCode::input || mesh.error().code == ErrorCode::limit;
+  };
+  for (const auto& [name, valid] : files) {
+    for (size_t length = 0; length < valid.size(); ++length) {
+      put(name, valid.substr(0, length));
+      ASSERT_TRUE(is_sound(name)) << name << " cut to " << length;
+    }
+    for (int i = 0; i < 1000; ++i) {
+      std::string changed = valid;
+      for (auto n = 1 + random_() % 3; n > 0; --n)
+        changed[random_() % changed.size()] = static_cast<char>(random_());
+      put(name, changed);
+      ASSERT_TRUE(is_sound(name)) << name << " " << changed;
+    }
+  }
+}
+
+TEST_F(MeshFileTest, EmbeddedTextures) {
+  const std::string png = picture("a.png");
+  std::filesystem::remove(path("a.png"));
+  GltfSquare file;
+  file.material = R"({"pbrMetallicRoughness":{"baseColorTexture":{"index":0}}})";
+  file.extra = png;
+  file.views = fmt::format(R"(,{{"buffer":0,"byteOffset":92,"byteLength":{}}})", png.size());
+  file.rest = R"(,"textures":[{"source":0}],"images":[{"bufferView":3,"mimeType":"image/png"}])";
+  const Mesh glb = read("a.glb", file.glb());
+  ASSERT_EQ(glb.textures.size(), 1u);
+  EXPECT_EQ(texel(glb, 0, 1, 0), (std::array<int, 4>{0, 255, 0, 255}));
+
+  file.rest = R"(,"textures":[{"source":0}],"images":[{"uri":"data:image/png;base64,)" + base64(png) + "\"}]";
+  const Mesh gltf = read("a.gltf", file.gltf());
+  ASSERT_EQ(gltf.textures.size(), 1u);
+  EXPECT_EQ(texel(gltf, 0, 0, 1), (std::array<int, 4>{0, 0, 255, 255}));
+}
+
+TEST_F(MeshFileTest, VertexColoursOfGltfAreLight) {
+  GltfSquare file;
+  file.attributes = R"(,"COLOR_0":3)";
+  file.accessors = R"(,{"bufferView":3,"componentType":5126,"count":4,"type":"VEC3"})";
+  file.extra = bytes_of(std::vector<float>{0.5f, 0, 0, 0, 0.5f, 0, 0, 0, 0.5f, 2, -1, NAN});
+  file.views = R"(,{"buffer":0,"byteOffset":92,"byteLength":48})";
+  const Mesh mesh = read("a.glb", file.glb());
+  ASSERT_EQ(mesh.colors.size(), mesh.positions.size());
+  for (const MeshTriangle& triangle : mesh.triangles)
+    for (const uint32_t v : triangle.vertices) {
+      const glm::dvec3 p = mesh.positions[v];
+      // What is out of range is brought into it.
+      const glm::vec4 want = p.y == 0   ? p.x == 0 ? glm::vec4(0.5f, 0, 0, 1) : glm::vec4(0, 0.5f, 0, 1)
+                               : p.x == 1 ? glm::vec4(0, 0, 0.5f, 1)
+                                        : glm::vec4(1, 0, 0, 1);
+      EXPECT_EQ(mesh.colors[v], want);
+    }
+}
+
+TEST_F(MeshFileTest, OpacityOfObj) {
+  picture("color.png");
+  picture("cut.png", {255, 0, 100, 255});
+  // By the texture's own alpha, by the alpha of a map, and by a map's brightness, which is stretched.
+  put("m.mtl",
+      "newmtl a\nmap_Kd cut.png\nnewmtl b\nmap_Kd color.png\nmap_d cut.png\nnewmtl c\nmap_d color.png\n");
+  const Mesh mesh = read(
+      "a.obj", obj_square("mtllib m.mtl\nusemtl a\n") + "usemtl b\nf 1/1 2/2 3/3\nusemtl c\nf 1/1 2/2 3/3\n");
+  ASSERT_EQ(mesh.textures.size(), 3u);
+  for (const MeshMaterial& material : mesh.materials) {
+    if (material.texture < 0) continue;
+    EXPECT_EQ(material.alpha_mode, AlphaMode::mask);
+    const auto alpha = texel(mesh, static_cast<size_t>(material.texture), 0, 1)[3];
+    EXPECT_EQ(alpha, material.name == "c" ? 29 : 100) << material.name;  // blue's part of the brightness
+  }
+}
+
+TEST_F(MeshFileTest, NamesOfTextures) {
+  std::filesystem::create_directories(path("Maps/deep"));
+  picture("Maps/deep/Wall.PNG");
+  picture("beside.png");
+  for (const char* name :
+       {"Maps/deep/Wall.PNG", "Maps\\deep\\Wall.PNG", "maps\\DEEP\\wall.png", ".\\Maps\\deep\\wall.png",
+        "C:\\work\\old\\Beside.png", "/nowhere/beside.png", "Maps/../beside.png"}) {
+    put("m.mtl", fmt::format("newmtl a\nmap_Kd {}\n", name));
+    const Mesh mesh = read("a.obj", obj_square("mtllib m.mtl\nusemtl a\n"));
+    EXPECT_EQ(mesh.textures.size(), 1u) << name;
+  }
+}
+
+TEST_F(MeshFileTest, WhatIsMissingIsNamed) {
+  put("m.mtl", "newmtl stone wall\nmap_Kd textures/brick.png\n");
+  expect_error("a.obj", obj_square("mtllib m.mtl\nusemtl stone wall\n"), "textures/brick.png is missing");
+  expect_error("a.obj", obj_square("mtllib lost.mtl\nusemtl a\n"), "lost.mtl is missing");
+  GltfSquare file;
+  expect_error("a.gltf", file.json("lost.bin"), "lost.bin is missing");
+  expect_error("a.xyz", "", "expected .obj, .gltf, .glb or .ply");
+  const auto none = read_mesh(path("none.obj"), ctx_);
+  ASSERT_FALSE(none);
+  EXPECT_EQ(none.error().code, ErrorCode::input);
+}
+
+TEST_F(MeshFileTest, BrokenTextures) {
+  const std::string png = picture("a.png");
+  put("m.mtl", "newmtl a\nmap_Kd a.png\n");
+  const std::string obj = obj_square("mtllib m.mtl\nusemtl a\n");
+  put("a.png", png.substr(0, png.size() / 2));
+  expect_error("a.obj", obj, "PNG");
+  put("a.png", "not a picture");
+  expect_error("a.obj", obj, "not a PNG file");
+  put("m.mtl", "newmtl a\nmap_Kd a.txt\n");
+  put("a.txt", "text");
+  expect_error("a.obj", obj, "not an image");
+
+  GltfSquare file;
+  file.material = R"({"pbrMetallicRoughness":{"baseColorTexture":{"index":0}}})";
+  file.extra = "GIF89a......";
+  file.views = R"(,{"buffer":0,"byteOffset":92,"byteLength":12})";
+  file.rest = R"(,"textures":[{"source":0}],"images":[{"bufferView":3,"mimeType":"image/png"}])";
+  expect_error("a.glb", file.glb(), "expected PNG or JPEG");
+}
+
+TEST_F(MeshFileTest, NumbersThatAreNone) {
+  for (const char* bad : {"nan", "inf", "-inf", "1e39"}) {
+    expect_error("a.obj", fmt::format("v 0 0 0\nv 1 0 {}\nv 0 1 0\nf 1 2 3\n", bad),
+                 "expected finite coordinates");
+  }
+  // Where no triangle is, they do not matter.
+  EXPECT_EQ(read("a.obj", "v 0 0 0\nv 1 0 0\nv 0 1 0\nv nan 0 0\nf 1 2 3\n").triangles.size(), 1u);
+  // Far away is not an error.
+  EXPECT_EQ(read("a.obj", "v 3e38 0 0\nv -3e38 0 0\nv 0 1 0\nf 1 2 3\n").triangles.size(), 1u);
+}
+
+TEST_F(MeshFileTest, TrianglesWithoutAreaAreDropped) {
+  const std::string vertices = "v 0 0 0\nv 1 0 0\nv 0 1 0\nv 2 0 0\n";
+  EXPECT_EQ(read("a.obj", vertices + "f 1 2 3\nf 1 2 4\nf 1 1 2\nf 2 2 2\np 1\nl 1 2\n").triangles.size(),
+            1u);
+  expect_error("a.obj", vertices + "f 1 2 4\n", "without triangles that have an area");
+  expect_error("a.obj", "# nothing\n", "not a mesh");
+}
+
+TEST_F(MeshFileTest, LimitOfMemory) {
+  std::string obj;
+  for (int i = 0; i < 3000; ++i) obj += fmt::format("v {} 0 0\nv {} 1 0\nv {} 0 1\nf -1 -2 -3\n", i, i, i);
+  const MemoryBudget& before = memory_;
+  EXPECT_EQ(read("a.obj", obj).triangles.size(), 3000u);
+  MemoryBudget small(200 << 10);
+  ctx_.memory = &small;
+  expect_error("a.obj", obj, "--max-memory", ErrorCode::limit);
+  ctx_.memory = &memory_;
+  EXPECT_TRUE(memory_.reserve(before.limit(), "all of it")) << "something was not given back";
+}
+
+TEST_F(MeshFileTest, ChecksOfMeshes) {
+  Mesh mesh;
+  mesh.materials.resize(1);
+  mesh.positions = {{0, 0, 0}, {1, 0, 0}, {0, 1, 0}};
+  mesh.triangles = {{{0, 1, 2}, 0}};
+  EXPECT_TRUE(check_mesh(mesh, "x"));
+  mesh.triangles = {{{0, 1, 3}, 0}};
+  EXPECT_EQ(check_mesh(mesh, "x").error().what, "corrupt mesh: triangle 0: vertex 3: expected one below 3");
+  mesh.triangles = {{{0, 1, 2}, 1}};
+  EXPECT_EQ(check_mesh(mesh, "x").error().what, "corrupt mesh: triangle 0: material 1: expected one below 1");
+  mesh.triangles = {{{0, 1, 2}, 0}};
+  mesh.uvs = {{0, 0}, {0, NAN}, {1, 1}};
+  EXPECT_NE(check_mesh(mesh, "x").error().what.find("expected finite ones"), std::string::npos);
+  mesh.uvs.resize(2);
+  EXPECT_EQ(check_mesh(mesh, "x").error().code, ErrorCode::input);
+}
+
+}  // namespace
+}  // namespace voxkit
