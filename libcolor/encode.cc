@@ -9,6 +9,7 @@
 #include "libcolor/block_encode.h"
 #include "libcolor/dag_builder.h"
 #include "libcolor/layout.h"
+#include "libcolor/node_colors.h"
 
 namespace voxkit::color {
 namespace {
@@ -109,12 +110,23 @@ Result<Report> encode(SurfaceSource& source, const Options& options, const ByteS
   ColorWriter colors(options, container, ctx);
   VOX_CHECK(colors.begin());
   DagBuilder builder(height, options.colors, options.counts, ctx);
+  std::vector<Rgb> held;  // with Colors::all, until the nodes above are known
+  Reservation reservation(*ctx.memory);
   VOX_CHECK(source.read(ctx, [&](std::span<const SurfaceVoxel> run) -> Status {
     VOX_CHECK(builder.add(run));
-    for (const SurfaceVoxel& voxel : run) VOX_CHECK(colors.add(voxel.color));
+    if (options.colors == Colors::all) {
+      VOX_CHECK(reservation.add(run.size() * sizeof(Rgb), "the colors of all voxels"));
+      for (const SurfaceVoxel& voxel : run) held.push_back(voxel.color);
+    } else {
+      for (const SurfaceVoxel& voxel : run) VOX_CHECK(colors.add(voxel.color));
+    }
     return {};
   }));
   VOX_TRY(const Dag dag, builder.finish());
+  if (options.colors == Colors::all) {
+    VOX_TRY(const std::vector<Rgb> all, node_colors(dag, held, reservation));
+    for (const Rgb color : all) VOX_CHECK(colors.add(color));
+  }
   VOX_CHECK(colors.finish());
 
   Report report;

@@ -9,6 +9,7 @@ namespace voxkit::color {
 namespace {
 
 constexpr size_t params_bytes = 128;
+constexpr uint8_t morton_curve = 1;  // the order of octants
 
 }  // namespace
 
@@ -25,6 +26,7 @@ std::vector<std::byte> pack_params(const Params& p) {
   bytes[3] = static_cast<std::byte>(p.endpoints);
   bytes[4] = static_cast<std::byte>(p.height);
   bytes[5] = static_cast<std::byte>(p.weight_bits);
+  bytes[6] = std::byte{morton_curve};
   store_le(&bytes[8], p.leaf_voxels);
   store_le(&bytes[16], p.color_count);
   store_le(&bytes[24], p.root);
@@ -57,6 +59,7 @@ Result<Params> unpack_params(std::span<const std::byte> bytes, const VolumeInfo&
   VOX_CHECK(is_one_of(1, 2, "choice of colors"));
   VOX_CHECK(is_one_of(2, 2, "place of counts"));
   VOX_CHECK(is_one_of(3, 2, "kind of endpoints"));
+  VOX_CHECK(is_one_of(6, morton_curve, "curve"));
   Params p;
   p.codec = static_cast<ColorCodec>(field(0));
   p.colors = static_cast<Colors>(field(1));
