@@ -60,7 +60,8 @@ def xxh64(data):
 # ---- Section 1: the container ----------------------------------------------------------------------------------------
 
 Chunk = namedtuple("Chunk", "kind index part offset length checksum")
-KINDS = (b"VOLI", b"SVMP", b"BLKS", b"VQPM", b"OFFS", b"ADDR", b"CODE")  # any other kind is ignored
+KINDS = (b"VOLI", b"SVMP", b"BLKS", b"VQPM", b"OFFS", b"ADDR", b"CODE", b"DAGP", b"LEAF", b"NODE",
+         b"COLR")  # any other kind is ignored
 
 
 class Container:

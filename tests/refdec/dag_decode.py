@@ -1,0 +1,230 @@
+#!/usr/bin/env python3
+"""Reference decoder of coloured surfaces, written from formats/FORMAT.md alone. Python 3.9 or later, nothing else.
+
+    dag_decode.py FILE.dagc OUT.raw    write the voxels, RGBA, x fastest
+    dag_decode.py --info FILE.dagc     print what the headers say as JSON
+
+It is meant to be read and to be trusted, not to be fast. Section numbers are those of FORMAT.md.
+Exit codes: 0 done, 2 usage, 3 the file is unreadable, corrupt or unsupported, 4 cannot write, 5 too large.
+"""
+
+import argparse
+import json
+import struct
+import sys
+
+from container import Container, Refused, Volume, require
+
+SURFACE = 3
+CODECS = {1: "raw", 2: "fws", 3: "vws"}
+VOXELS, ALL = 1, 2
+IN_NODES, BESIDE = 1, 2
+WIDE = (1 << 24) - 1
+PART, MACRO = 1 << 20, 1 << 14
+MOST_VOXELS = 1 << 27
+
+
+class Surface:
+    """The parameters of a file, its nodes and its colours."""
+
+    def __init__(self, container):
+        require(container.codec == SURFACE, "header: byte 10: codec {}, expected 3", container.codec)
+        self.container, self.volume = container, Volume(container)
+        require(self.volume.format == "RGBA32", "chunk VOLI: voxel format {}", self.volume.format)
+        require(max(self.volume.dims) <= 1 << 21, "chunk VOLI: a side above 2^21")
+        self.read_parameters(container.only(b"DAGP"))
+        self.read_nodes()
+        self.read_parts()
+
+    # Section 4.1
+    def read_parameters(self, chunk):
+        at = chunk.offset
+        require(chunk.length == 128, "chunk DAGP: byte {}: {} bytes, expected 128", at, chunk.length)
+        (self.codec, self.has_color, self.counts, self.endpoints, self.height, _, curve, self.voxels, self.count,
+         self.root, self.threshold, self.error) = self.container.unpack("<7BxQQI4xdd", at)
+        require(self.codec in CODECS, "chunk DAGP: byte 0: {}", self.codec)
+        require(self.has_color in (VOXELS, ALL), "chunk DAGP: byte 1: {}", self.has_color)
+        require(self.counts in (IN_NODES, BESIDE), "chunk DAGP: byte 2: {}", self.counts)
+        require(self.endpoints in (1, 2), "chunk DAGP: byte 3: {}", self.endpoints)
+        require(curve == 1, "chunk DAGP: byte 6: {}", curve)
+        height = 2
+        while 1 << height < max(self.volume.dims):
+            height += 1
+        require(self.height == height, "chunk DAGP: byte 4: height {}, expected {}", self.height, height)
+        require(self.voxels <= self.count <= self.voxels * (height + 1), "chunk DAGP: {} colours", self.count)
+
+    def words(self, kind, index, letter, size):
+        found = [c for c in self.container.chunks.values() if c.kind == kind and c.index == index]
+        require(len(found) == 1 and found[0].part == 0, "chunks {} {}: expected one", kind.decode(), index)
+        chunk = found[0]
+        require(chunk.length % size == 0, "chunk {} {}: {} bytes", kind.decode(), index, chunk.length)
+        return self.container.unpack("<%d%s" % (chunk.length // size, letter), chunk.offset)
+
+    # Sections 4.2 and 4.3
+    def read_nodes(self):
+        self.leaves = self.words(b"LEAF", 0, "Q", 8)
+        self.nodes = {h: self.words(b"NODE", h, "I", 4) for h in range(3, self.height + 1)}
+        indices = [c.index for c in self.container.chunks.values() if c.kind == b"NODE"]
+        require(sorted(indices) == list(range(3, self.height + 1)), "chunks NODE: indices {}", sorted(indices))
+
+    def children(self, h, pointer):
+        """(octant, pointer) of all octants of a node that have voxels."""
+        words = self.nodes[h]
+        require(pointer < len(words), "chunk NODE {}: no word {}", h, pointer)
+        octants = [o for o in range(8) if words[pointer] >> o & 1]
+        stride = 2 if self.counts == BESIDE else 1
+        require(pointer + 1 + stride * len(octants) <= len(words), "chunk NODE {}: a node ends behind it", h)
+        return [(o, words[pointer + 1 + stride * i]) for i, o in enumerate(octants)]
+
+    # Section 4.4
+    def walk(self):
+        """(x, y, z, number of its colour) of all voxels: by counting, not by the file's counts."""
+        number = 0
+
+        def cell(h, pointer, x, y, z):
+            nonlocal number
+            if h == 2:
+                require(pointer < len(self.leaves), "chunk LEAF: no word {}", pointer)
+                yield from inside(2, self.leaves[pointer], x, y, z)
+                return
+            if self.has_color == ALL:
+                number += 1
+            half = 1 << h - 1
+            for octant, child in self.children(h, pointer):
+                yield from cell(h - 1, child, x + half * (octant & 1), y + half * (octant >> 1 & 1), z + half * (octant >> 2))
+
+        def inside(h, bits, x, y, z):
+            nonlocal number
+            if bits == 0:
+                return
+            number += 1 if h == 0 or self.has_color == ALL else 0
+            if h == 0:
+                yield x, y, z, number - 1
+                return
+            width, half = 8 ** (h - 1), 1 << h - 1
+            for octant in range(8):
+                yield from inside(h - 1, bits >> octant * width & (1 << width) - 1, x + half * (octant & 1),
+                                  y + half * (octant >> 1 & 1), z + half * (octant >> 2))
+
+        if self.voxels:
+            yield from cell(self.height, self.root, 0, 0, 0)
+        self.counted = number
+
+    # Section 4.5
+    def read_parts(self):
+        chunks = sorted((c for c in self.container.chunks.values() if c.kind == b"COLR"), key=lambda c: c.part)
+        parts = -(-self.count // PART)
+        require([(c.index, c.part) for c in chunks] == [(0, i) for i in range(parts)], "chunks COLR: not their parts")
+        self.colors = []
+        for chunk in chunks:
+            data = self.container.data[chunk.offset:chunk.offset + chunk.length]
+            n = min(PART, self.count - PART * chunk.part)
+            self.colors += self.raw(data, n) if self.codec == 1 else self.part(data, n)
+
+    @staticmethod
+    def raw(data, n):
+        require(len(data) == 3 * n, "chunk COLR: {} bytes of {} colours", len(data), n)
+        return [tuple(data[3 * i:3 * i + 3]) for i in range(n)]
+
+    def part(self, data, n):
+        h, m = (8 if self.endpoints == 1 else 10), -(-n // MACRO)
+        require(len(data) >= 16 + 16 * m, "chunk COLR: {} bytes", len(data))
+        b = struct.unpack_from("<I", data)[0]
+        start = (8 + 16 * m + h * b + 7) // 8 * 8
+        require(start + 8 <= len(data), "chunk COLR: {} blocks in {} bytes", b, len(data))
+        weights = int.from_bytes(data[start:-8], "little")
+        end = 8 * (len(data) - start - 8)
+        heads = [struct.unpack_from("<QQ", data, 8 + 16 * k) for k in range(m)] + [(b, 0)]
+        firsts = [first & (1 << 63) - 1 for first, _ in heads]
+        require(firsts[0] == 0 and firsts == sorted(firsts), "chunk COLR: macro blocks out of order")
+        colors = []
+        for k in range(m):
+            size, (first, bit) = min(MACRO, n - MACRO * k), heads[k]
+            if first >> 63:
+                require(firsts[k] == firsts[k + 1] and bit % 8 == 0 and bit + 24 * size <= end,
+                        "chunk COLR: macro block {}", k)
+                at = start + bit // 8
+                colors += [tuple(data[at + 3 * i:at + 3 * i + 3]) for i in range(size)]
+                continue
+            headers = [data[8 + 16 * m + h * j:8 + 16 * m + h * (j + 1)] for j in range(firsts[k], firsts[k + 1])]
+            starts = [struct.unpack_from("<I", header)[0] & 0x3FFF for header in headers] + [size]
+            require(headers and starts[0] == 0 and all(s < t for s, t in zip(starts, starts[1:])),
+                    "chunk COLR: blocks of macro block {}", k)
+            for header, s, t in zip(headers, starts, starts[1:]):
+                colors += self.block(header, t - s, weights, bit, end)
+        return colors
+
+    def block(self, header, size, weights, bit, end):
+        word = struct.unpack_from("<I", header)[0]
+        w, q = (word >> 14 & 3) + 1, word >> 16
+        if q == 65535:
+            if self.endpoints == 2:
+                return [tuple(header[4:7])] * size
+            v = struct.unpack_from("<I", header, 4)[0]
+            return [((255 * (v & 1023) + 511) // 1023, (255 * (v >> 10 & 4095) + 2047) // 4095,
+                     (255 * (v >> 22) + 511) // 1023)] * size
+        if self.endpoints == 2:
+            ends = tuple(header[4:7]), tuple(header[7:10])
+        else:
+            ends = [(8 * (v & 31) + (v & 31) // 4, 4 * (v >> 5 & 63) + (v >> 5 & 63) // 16, 8 * (v >> 11) + (v >> 11) // 4)
+                    for v in struct.unpack_from("<HH", header, 4)]
+        most = (1 << w) - 1
+        require(bit + q + w * size <= end, "chunk COLR: weights behind the end")
+        steps = [tuple((2 * (a * (most - v) + c * v) + most) // (2 * most) for a, c in zip(*ends)) for v in range(most + 1)]
+        return [steps[weights >> bit + q + w * i & most] for i in range(size)]
+
+
+def decode(surface):
+    x, y, z = surface.volume.dims
+    out = bytearray(4 * x * y * z)
+    found = 0
+    for vx, vy, vz, number in surface.walk():
+        require(vx < x and vy < y and vz < z, "a voxel at {},{},{}: outside the volume", vx, vy, vz)
+        require(number < surface.count, "colour {} of {}", number, surface.count)
+        at = 4 * ((vz * y + vy) * x + vx)
+        out[at:at + 4] = bytes(surface.colors[number]) + b"\xff"
+        found += 1
+    require(found == surface.voxels and surface.counted == surface.count, "{} voxels and {} colours: expected {} and {}",
+            found, surface.counted, surface.voxels, surface.count)
+    return out
+
+
+def info(surface):
+    return {"dims": surface.volume.dims, "codec": CODECS[surface.codec], "colors": surface.has_color,
+            "counts": surface.counts, "endpoints": surface.endpoints, "height": surface.height,
+            "leaf_voxels": surface.voxels, "color_count": surface.count, "threshold": surface.threshold}
+
+
+def main():
+    parser = argparse.ArgumentParser(description="Decodes a coloured surface.")
+    parser.add_argument("--info", action="store_true")
+    parser.add_argument("file")
+    parser.add_argument("out", nargs="?")
+    options = parser.parse_args()
+    if options.info == (options.out is not None):
+        parser.error("expected FILE OUT, or --info FILE")
+    try:
+        with open(options.file, "rb") as file:
+            surface = Surface(Container(file.read()))
+        if options.info:
+            print(json.dumps(info(surface)))
+            return 0
+        x, y, z = surface.volume.dims
+        if x * y * z > MOST_VOXELS:
+            print("{}: too many voxels".format(options.file), file=sys.stderr)
+            return 5
+        data = decode(surface)
+    except (Refused, OSError) as error:
+        print("{}: {}".format(options.file, error), file=sys.stderr)
+        return 3
+    try:
+        with open(options.out, "wb") as file:
+            file.write(data)
+    except OSError as error:
+        print("{}: {}".format(options.out, error), file=sys.stderr)
+        return 4
+    return 0
+
+
+if __name__ == "__main__":
+    sys.exit(main())

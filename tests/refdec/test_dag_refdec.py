@@ -1,0 +1,118 @@
+#!/usr/bin/env python3
+"""Holds the reference decoder of coloured surfaces against the tools: VOXKIT_BIN=build/bin python3 test_dag_refdec.py
+
+Without VOXKIT_BIN only the tests that need no tool are run.
+"""
+
+import json
+import os
+import random
+import struct
+import sys
+import unittest
+
+sys.dont_write_bytecode = True
+from container import Container, Refused  # noqa: E402
+from helpers import BIN, HERE, ToolCase, container, read, write  # noqa: E402
+from dag_decode import Surface, decode  # noqa: E402
+
+DECODER = os.path.join(HERE, "dag_decode.py")
+
+
+# ---- Without tools ---------------------------------------------------------------------------------------------------
+
+
+class SmallFile(unittest.TestCase):
+    """8 x 4 x 4 voxels: the first and the last one, and the eight of the octant at (4, 0, 0)."""
+
+    def setUp(self):
+        self.voli = struct.pack("<3QBB6x3d3d2d2d", 8, 4, 4, 1, 1, 1, 1, 1, 0, 0, 0, 1, 0, 0, 0)
+        self.dagp = bytearray(struct.pack("<7BxQQI4x2d5Q40x", 3, 1, 1, 1, 3, 0, 1, 10, 10, 0, 9.56, 0, 0, 0, 0, 0, 0))
+        self.leaf = bytearray(struct.pack("<2Q", 1, 0xFF | 1 << 63))
+        self.node = bytearray(struct.pack("<3I", 0b11 | 10 << 8, 0, 1))
+        # One colour, eight with 1 bit each, one colour.
+        self.colr = bytearray(struct.pack("<II", 3, 0) + struct.pack("<QQ", 0, 0) +
+                              struct.pack("<II", 0 | 65535 << 16, 1023 | 2047 << 10) +
+                              struct.pack("<IHH", 1 | 0 << 14 | 0 << 16, 0, 0xFFFF) +
+                              struct.pack("<II", 9 | 65535 << 16, 1023 << 22) + bytes((0b10000001,)) + bytes(8))
+
+    def file(self):
+        return container([(b"VOLI", 0, 0, self.voli), (b"DAGP", 0, 0, bytes(self.dagp)), (b"LEAF", 0, 0, bytes(self.leaf)),
+                          (b"NODE", 3, 0, bytes(self.node)), (b"COLR", 0, 0, bytes(self.colr))], codec=3)
+
+    def test_decodes(self):
+        out = decode(Surface(Container(self.file())))
+        voxel = lambda x, y, z: tuple(out[4 * ((z * 4 + y) * 8 + x):][:4])
+        self.assertEqual(voxel(0, 0, 0), (255, 127, 0, 255))
+        self.assertEqual(voxel(4, 0, 0), (255, 255, 255, 255))
+        self.assertEqual(voxel(5, 0, 0), (0, 0, 0, 255))
+        self.assertEqual(voxel(5, 1, 1), (255, 255, 255, 255))
+        self.assertEqual(voxel(7, 3, 3), (0, 0, 255, 255))
+        self.assertEqual(sum(1 for at in range(3, len(out), 4) if out[at]), 10)
+
+    def test_broken_rules(self):
+        for chunk, layout, offset, value in (
+                ("dagp", "<B", 0, 4), ("dagp", "<B", 1, 3), ("dagp", "<B", 2, 0), ("dagp", "<B", 3, 3),
+                ("dagp", "<B", 4, 4), ("dagp", "<B", 6, 2), ("dagp", "<Q", 8, 11), ("dagp", "<Q", 16, 11),
+                ("dagp", "<Q", 8, 9), ("dagp", "<I", 24, 3), ("node", "<I", 4, 2), ("node", "<I", 0, 0b111),
+                ("colr", "<I", 0, 4), ("colr", "<Q", 8, 1), ("colr", "<Q", 16, 1), ("colr", "<I", 32, 0),
+                ("colr", "<I", 32, 1 | 1 << 16)):
+            self.setUp()
+            struct.pack_into(layout, getattr(self, chunk), offset, value)
+            with self.subTest(chunk=chunk, offset=offset, value=value), self.assertRaises(Refused):
+                decode(Surface(Container(self.file())))
+
+
+# ---- With tools ------------------------------------------------------------------------------------------------------
+
+
+@unittest.skipUnless(BIN, "VOXKIT_BIN is not set")
+class Tools(ToolCase):
+    def encode(self, source, *options):
+        self.run_program(os.path.join(BIN, "dagcolor-pack"), source, "-f", "-o", self.path("x.dagc"), *options)
+        return self.path("x.dagc")
+
+    def compare(self, file):
+        tool, reference = self.decode_both(DECODER, file, "good.raw")
+        self.assertEqual(len(tool), len(reference))
+        different = [at for at in range(len(tool)) if tool[at] != reference[at]]
+        self.assertFalse(different, "{} bytes differ, the first at {}".format(len(different), different[:1]))
+        said = json.loads(self.run_program(os.path.join(BIN, "vox-info"), file, "--json").stdout)
+        info = json.loads(self.run_program(sys.executable, DECODER, "--info", file).stdout)
+        for key in ("dims", "leaf_voxels", "color_count"):
+            self.assertEqual(info[key], said[key])
+        return info
+
+    def test_built_ins(self):
+        for options in (("--codec", "raw"), ("--codec", "fws"), ("--codec", "vws"), ("-e", "2"), ("-e", "25.5", "--effort", "1"),
+                        ("--colors", "all"), ("--counts", "pointer"), ("--colors", "all", "--counts", "pointer")):
+            with self.subTest(options=options):
+                self.compare(self.encode("menger:3", *options))
+
+    def test_volumes(self):
+        """Few voxels, many, noise in a macro block of its own, none."""
+        noise = random.Random(1)
+        for dims, share in (((1, 1, 1), 1.0), ((70, 3, 9), 0.1), ((40, 40, 40), 0.9), ((9, 9, 9), 0.0)):
+            data = bytearray()
+            for _ in range(dims[0] * dims[1] * dims[2]):
+                data += bytes((noise.randrange(256), noise.randrange(256), noise.randrange(256), 255)
+                              if noise.random() < share else 4)
+            write(self.path("in.raw"), data)
+            for options in ((), ("-e", "1"), ("--colors", "all")):
+                with self.subTest(dims=dims, options=options):
+                    self.compare(self.encode(self.path("in.raw"), "--dims", "%d,%d,%d" % dims, "--type", "rgba8", *options))
+
+    def test_damaged_files_are_refused(self):
+        data = read(self.encode("menger:2"))
+        damaged = [data[:length] for length in (0, 7, 64, 200, len(data) // 2, len(data) - 64, len(data) - 1)]
+        for chunk in Container(data).chunks.values():
+            for at in {chunk.offset, chunk.offset + chunk.length - 1} if chunk.length else ():
+                damaged.append(data[:at] + bytes((data[at] ^ 16,)) + data[at + 1:])
+        for number, content in enumerate(damaged):
+            with self.subTest(number=number):
+                write(self.path("bad.dagc"), content)
+                self.assertEqual(self.decode_both(DECODER, self.path("bad.dagc"), "bad.raw", expect=3), [None, None])
+
+
+if __name__ == "__main__":
+    unittest.main()
