@@ -3,9 +3,11 @@
 
 #include <algorithm>
 #include <bit>
+#include <unordered_set>
 
 #include "formats/parallel.h"
 #include "formats/reservation.h"
+#include "libcolor/morton.h"
 #include "libcolor/store.h"
 
 namespace voxkit::color {
@@ -95,21 +97,24 @@ class Checker {
     return below;
   }
 
-  /// No voxel is outside the volume: of nodes that reach beyond it, those below.
-  Status check_extents(int h, uint32_t pointer, Index3 corner) const {
+  /// No voxel is outside the volume: of nodes that reach beyond it, those below. A node need be looked at
+  /// once for each way to reach beyond, however often it is there.
+  Status check_extents(int h, uint32_t pointer, Index3 corner) {
     const Index3 dims = volume_.info().dims, end = corner + (int64_t{1} << h);
-    if (end.x <= dims.x && end.y <= dims.y && end.z <= dims.z) return {};
     const auto outside = [&] {
       return bad(fmt::format("a voxel in the cell of {} at {},{},{}: outside the volume", 1 << h, corner.x,
                              corner.y, corner.z));
     };
-    if (corner.x >= dims.x || corner.y >= dims.y || corner.z >= dims.z) return outside();
+    uint64_t beyond = 0;
+    for (int a = 0; a < 3; ++a) {
+      if (corner[a] >= dims[a]) return outside();
+      if (end[a] > dims[a]) beyond |= uint64_t{1} << a;
+    }
+    if (beyond == 0 || !seen_.insert(pointer | beyond << 32 | static_cast<uint64_t>(h) << 40).second)
+      return {};
     if (h == leaf_height) {
-      const uint64_t leaf = view_.leaf(pointer);
-      for (uint64_t left = leaf; left != 0; left &= left - 1) {
-        const auto bit = static_cast<uint32_t>(std::countr_zero(left));
-        const Index3 at = corner + Index3((bit & 1) | (bit >> 2 & 2), (bit >> 1 & 1) | (bit >> 3 & 2),
-                                          (bit >> 2 & 1) | (bit >> 4 & 2));
+      for (uint64_t left = view_.leaf(pointer); left != 0; left &= left - 1) {
+        const Index3 at = corner + Index3(morton_place(static_cast<uint64_t>(std::countr_zero(left))));
         if (at.x >= dims.x || at.y >= dims.y || at.z >= dims.z) return outside();
       }
       return {};
@@ -164,6 +169,7 @@ class Checker {
   const DagView& view_;
   Context& ctx_;
   Reservation reservation_;
+  std::unordered_set<uint64_t> seen_;  ///< nodes that reach beyond the volume
 };
 
 }  // namespace

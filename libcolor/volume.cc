@@ -123,25 +123,57 @@ Status Volume::decode(const Box& box, VoxelSpan out) const {
   return store_->status();
 }
 
+namespace {
+
+/// Whether there may be a voxel in a box. Every node has some, so those that lie inside as a whole need no
+/// look.
+class BoxSearch {
+ public:
+  BoxSearch(const DagView& view, const Box& box) : view_(view), box_(box) {}
+  bool may_have_voxels(int h, uint32_t pointer, Index3 corner) {
+    const Box cell{corner, corner + (int64_t{1} << h)};
+    if (intersect(cell, box_).empty()) return false;
+    // Along the sides of a large box there may be many: then it is not known.
+    if (box_.contains(cell) || --budget_ < 0) return true;
+    if (h == leaf_height) {
+      for (uint64_t left = view_.leaf(pointer); left != 0; left &= left - 1)
+        if (box_.contains(corner + Index3(morton_place(static_cast<uint64_t>(std::countr_zero(left))))))
+          return true;
+      return false;
+    }
+    const NodeRef ref = view_.node(h, pointer);
+    if (ref.words == nullptr) return true;
+    for (uint32_t octant = 0; octant < 8; ++octant)
+      if (ref.has(octant) && may_have_voxels(h - 1, view_.child(ref, h, octant).pointer,
+                                             octant_corner(corner, octant, int64_t{1} << (h - 1))))
+        return true;
+    return false;
+  }
+
+ private:
+  const DagView& view_;
+  Box box_;
+  int budget_ = 4096;
+};
+
+}  // namespace
+
 std::optional<Voxel> Volume::uniform(const Box& box) const {
+  if (params_.leaf_voxels == 0) return Voxel{};
   const auto view = store_->dag(*container_, params_);
-  if (!view) return std::nullopt;
-  const bool empty = BoxWalk(**view, box).run([&](uint64_t leaf, Index3 corner, uint64_t) {
-    if (box.contains(Box{corner, corner + leaf_side})) return leaf == 0;
-    for (uint64_t left = leaf; left != 0; left &= left - 1)
-      if (box.contains(corner + Index3(morton_place(static_cast<uint64_t>(std::countr_zero(left))))))
-        return false;
-    return true;
-  });
-  return empty ? std::optional(Voxel{}) : std::nullopt;
+  if (!view || BoxSearch(**view, box).may_have_voxels(params_.height, params_.root, Index3(0)))
+    return std::nullopt;
+  return Voxel{};
 }
 
 Status Volume::for_each_voxel(const SurfaceSource::Sink& sink, Context&) const {
   VOX_TRY(const DagView* const view, store_->dag(*container_, params_));
+  if (params_.leaf_voxels == 0) return {};
   ColorReader reader(*store_, *container_, params_);
   constexpr size_t run_voxels = 1 << 16;
   std::vector<SurfaceVoxel> run;
   run.reserve(run_voxels + 64);
+  uint64_t found = 0;
   Status status;
   const auto flush = [&] {
     status = check_interrupt();
@@ -153,6 +185,9 @@ Status Volume::for_each_voxel(const SurfaceSource::Sink& sink, Context&) const {
   const bool complete = BoxWalk(*view, info_.box()).run([&](uint64_t leaf, Index3 corner, uint64_t color) {
     const uint64_t first = morton_code(static_cast<uint32_t>(corner.x), static_cast<uint32_t>(corner.y),
                                        static_cast<uint32_t>(corner.z));
+    // A word without voxels is of no surface, and there may be any number of them.
+    found += static_cast<uint64_t>(std::popcount(leaf));
+    if (leaf == 0 || found > params_.leaf_voxels) return false;
     for (uint64_t left = leaf; left != 0; left &= left - 1) {
       const auto bit = static_cast<uint32_t>(std::countr_zero(left));
       run.push_back({first | bit, reader.color(color + leaf_index(leaf, bit, view->colors))});
@@ -160,6 +195,9 @@ Status Volume::for_each_voxel(const SurfaceSource::Sink& sink, Context&) const {
     return run.size() < run_voxels || flush();
   });
   if (complete) flush();
+  if (status && (!complete || found != params_.leaf_voxels))
+    return bad_input(container_->name(),
+                     fmt::format("chunk DAGP, byte 8: {} voxels: others are there", params_.leaf_voxels));
   return status;
 }
 

@@ -7,6 +7,7 @@
 #include <random>
 #include <vector>
 
+#include "libcolor/color.h"
 #include "libcolor/morton.h"
 #include "libcolor/surface.h"
 
@@ -54,6 +55,42 @@ inline Voxels scattered(int height, size_t count, uint64_t seed) {
   Voxels voxels;
   for (const uint64_t place : places) voxels.push_back({place, color_at(place)});
   return voxels;
+}
+
+/// Voxels in memory, in runs of any length.
+class ListSource final : public SurfaceSource {
+ public:
+  ListSource(Voxels voxels, Index3 dims, size_t run = 999) : voxels_(std::move(voxels)), run_(run) {
+    info_.dims = dims;
+    info_.format = VoxelFormat::rgba32;
+    info_.spacing = {0.5, 0.5, 0.5};
+  }
+  Status read(Context&, const Sink& sink) override {
+    for (size_t i = 0; i < voxels_.size(); i += run_)
+      VOX_CHECK(sink(std::span(voxels_).subspan(i, std::min(run_, voxels_.size() - i))));
+    return {};
+  }
+
+ private:
+  Voxels voxels_;
+  size_t run_;
+};
+
+/// A compressed file in memory; empty where that fails.
+inline std::vector<std::byte> compressed(SurfaceSource& source, const Options& options, int threads = 1) {
+  MemoryBudget memory;
+  Context ctx;
+  ctx.memory = &memory;
+  ctx.threads = threads;
+  std::vector<std::byte> bytes;
+  const auto report = encode(
+      source, options,
+      [&](std::span<const std::byte> some) -> Status {
+        bytes.insert(bytes.end(), some.begin(), some.end());
+        return {};
+      },
+      ctx);
+  return report ? bytes : std::vector<std::byte>();
 }
 
 }  // namespace voxkit::color

@@ -21,25 +21,6 @@ struct Fixture {
   }
 };
 
-/// Voxels in memory, in runs of any length.
-class ListSource final : public SurfaceSource {
- public:
-  ListSource(Voxels voxels, Index3 dims, size_t run = 999) : voxels_(std::move(voxels)), run_(run) {
-    info_.dims = dims;
-    info_.format = VoxelFormat::rgba32;
-    info_.spacing = {0.5, 0.5, 0.5};
-  }
-  Status read(Context&, const Sink& sink) override {
-    for (size_t i = 0; i < voxels_.size(); i += run_)
-      VOX_CHECK(sink(std::span(voxels_).subspan(i, std::min(run_, voxels_.size() - i))));
-    return {};
-  }
-
- private:
-  Voxels voxels_;
-  size_t run_;
-};
-
 struct Encoded {
   std::vector<std::byte> bytes;
   Report report;

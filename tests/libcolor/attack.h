@@ -1,0 +1,114 @@
+// All that can be asked of a compressed surface, asked of any bytes: what hostile_test.cc and the fuzz target
+// share.
+#pragma once
+
+#include <fmt/format.h>
+
+#include <glm/common.hpp>
+
+#include <memory>
+#include <optional>
+#include <span>
+#include <string>
+#include <vector>
+
+#include "libcolor/color.h"
+#include "libcolor/morton.h"
+
+namespace voxkit::color::test {
+
+/// How a file was dealt with.
+struct Answer {
+  bool opened = false;
+  bool checked = false;  ///< check() found nothing wrong
+  std::string fault;     ///< what is not acceptable on any input, in words; empty where all is well
+};
+
+inline std::string judge(const Error& error) {
+  if (error.code != ErrorCode::input && error.code != ErrorCode::limit)
+    return fmt::format("error of class {}: {}", static_cast<int>(error.code), error.what);
+  if (error.what.empty() || error.what.find('\n') != std::string::npos)
+    return "a message that is not one line: " + error.what;
+  return {};
+}
+
+/// A box, in one go and voxel by voxel.
+inline std::string ask_box(const Volume& volume, const Box& box) {
+  const Index3 size = box.size();
+  std::vector<std::byte> voxels(static_cast<size_t>(box.voxels()) * 4, std::byte{0xa5});
+  const VoxelSpan span = packed(voxels.data(), size, VoxelFormat::rgba32);
+  const Status status = volume.decode(box, span);
+  if (!status) return judge(status.error());
+  for (int64_t z = 0; z < size.z; z += 1 + size.z / 5)
+    for (int64_t y = 0; y < size.y; y += 1 + size.y / 5)
+      for (int64_t x = 0; x < size.x; x += 1 + size.x / 5) {
+        const std::byte* const p = span.row(y, z) + 4 * x;
+        if (p[3] != std::byte{0} && p[3] != std::byte{255}) return "an alpha that is neither 0 nor 255";
+        const Index3 at = box.lo + Index3(x, y, z);
+        const auto voxel = volume.voxel(at);
+        if (!voxel) {
+          if (auto fault = judge(voxel.error()); !fault.empty()) return fault;
+          continue;
+        }
+        if (voxel->has_value() != (p[3] != std::byte{0})) return "a voxel that the box has not, or has alone";
+        if (voxel->has_value() && volume.uniform({at, at + Index3(1)})) return "uniform() is wrong";
+      }
+  return {};
+}
+
+inline Answer attack(std::span<const std::byte> file) {
+  // Exactly its bytes on the heap: a sanitizer sees any read past the end.
+  const auto bytes = std::make_shared<const std::vector<std::byte>>(file.begin(), file.end());
+  Answer answer;
+  const auto container = Container::open(*bytes, "hostile", bytes);
+  if (!container) {
+    answer.fault = judge(container.error());
+    return answer;
+  }
+  const auto opened = Volume::open(*container);
+  if (!opened) {
+    answer.fault = judge(opened.error());
+    return answer;
+  }
+  answer.opened = true;
+  const Volume& volume = **opened;
+  MemoryBudget memory(uint64_t{256} << 20);
+  Context ctx;
+  ctx.memory = &memory;
+  const Status checked = volume.check(ctx);
+  answer.checked = checked.has_value();
+  if (!checked) answer.fault = judge(checked.error());
+  if (answer.fault.empty() && !memory.reserve(memory.limit(), "all of it"))
+    answer.fault = "reserved memory was kept";
+  if (!answer.fault.empty()) return answer;
+
+  const Index3 dims = volume.info().dims, size = glm::min(dims, Index3(48));
+  for (const Index3 corner : {Index3(0), dims - size, (dims - size) / Index3(2)}) {
+    answer.fault = ask_box(volume, {corner, corner + size});
+    if (!answer.fault.empty()) return answer;
+  }
+  for (const uint64_t index : {uint64_t{0}, volume.params().color_count / 2, volume.params().color_count - 1})
+    if (index < volume.params().color_count)
+      if (const auto color = volume.color(index); !color && answer.fault.empty())
+        answer.fault = judge(color.error());
+  // All voxels, as long as there are not too many.
+  uint64_t count = 0, next = 0;
+  bool ordered = true;
+  const Status walked = volume.for_each_voxel(
+      [&](std::span<const SurfaceVoxel> run) -> Status {
+        for (const SurfaceVoxel& v : run) {
+          ordered &= v.place >= next;
+          next = v.place + 1;
+        }
+        count += run.size();
+        return count > 1000000 ? fail(ErrorCode::limit, {}, "enough") : Status();
+      },
+      ctx);
+  if (!ordered) answer.fault = "voxels out of order";
+  if (!walked && answer.fault.empty()) answer.fault = judge(walked.error());
+  if (!walked && answer.checked && walked.error().code != ErrorCode::limit)
+    answer.fault = "check() finds nothing wrong, but voxels cannot be read: " + walked.error().what;
+  return answer;
+}
+
+}  // namespace voxkit::color::test

@@ -1,0 +1,86 @@
+// Damaged and invented files of surfaces: whatever the bytes, an error or a well-formed answer.
+#include <gtest/gtest.h>
+
+#include <cstdlib>
+
+#include "tests/damage.h"
+#include "tests/libcolor/attack.h"
+#include "tests/libcolor/scenes.h"
+
+namespace voxkit::color {
+namespace {
+
+using voxkit::test::Bytes;
+
+/// VOXKIT_MUTATIONS: how many damaged copies of each file are tried.
+int mutations() {
+  const char* text = std::getenv("VOXKIT_MUTATIONS");
+  return text && std::atoi(text) > 0 ? std::atoi(text) : 2000;
+}
+
+const std::vector<Bytes>& files() {
+  static const std::vector<Bytes> all = [] {
+    std::vector<Bytes> made;
+    for (const ColorCodec codec : {ColorCodec::raw, ColorCodec::fws, ColorCodec::vws})
+      for (const Counts counts : {Counts::node, Counts::pointer})
+        for (const Colors colors : {Colors::leaf, Colors::all}) {
+          Options options;
+          options.codec = codec;
+          options.counts = counts;
+          options.colors = colors;
+          if (colors == Colors::all) options.threshold = 3;
+          ListSource shell(sphere_shell(4), Index3(16)), few(scattered(6, 60, 1), Index3(64)),
+              none({}, Index3(9, 2, 3));
+          for (ListSource* source : {&shell, &few, &none}) made.push_back(compressed(*source, options));
+        }
+    return made;
+  }();
+  return all;
+}
+
+TEST(ColorHostile, TheFilesAreValid) {
+  for (const Bytes& file : files()) {
+    const test::Answer answer = test::attack(file);
+    EXPECT_EQ(answer.fault, "");
+    EXPECT_TRUE(answer.checked);
+  }
+}
+
+TEST(ColorHostile, EveryPrefixAndOneByteMoreIsRefused) {
+  for (const Bytes& file : files()) {
+    for (size_t length = 0; length < file.size(); length += 7) {
+      const test::Answer answer = test::attack(std::span(file).first(length));
+      ASSERT_EQ(answer.fault, "") << "cut to " << length;
+      ASSERT_FALSE(answer.opened) << "cut to " << length;
+    }
+    Bytes longer = file;
+    longer.push_back({});
+    EXPECT_FALSE(test::attack(longer).opened);
+  }
+}
+
+/// With every checksum made right the decoder itself is attacked.
+TEST(ColorHostile, ResealedDamageIsAnsweredSoundly) {
+  std::mt19937 random(2);
+  int sound = 0, refused = 0, refused_late = 0;
+  for (const Bytes& original : files()) {
+    const auto table = voxkit::test::table_of(original);
+    for (int i = 0; i < mutations(); ++i) {
+      Bytes file = original;
+      if (i % 5 == 0)
+        voxkit::test::damage(file, table.offset, file.size(), true, random);
+      else
+        voxkit::test::damage(file, 64, table.offset, true, random);
+      i % 10 == 0 ? voxkit::test::repair(file, Codec::color) : voxkit::test::reseal(file);
+      const test::Answer answer = test::attack(file);
+      ASSERT_EQ(answer.fault, "") << "mutation " << i;
+      ++(answer.checked ? sound : answer.opened ? refused_late : refused);
+    }
+  }
+  EXPECT_GT(sound, 1000);
+  EXPECT_GT(refused, 1000);
+  EXPECT_GT(refused_late, 1000);
+}
+
+}  // namespace
+}  // namespace voxkit::color
