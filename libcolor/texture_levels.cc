@@ -10,12 +10,18 @@
 namespace voxkit::color {
 namespace {
 
-using Short4 = uint16_t __attribute__((vector_size(8)));
+using Short8 = uint16_t __attribute__((vector_size(16)));
+using Long2 = uint64_t __attribute__((vector_size(16)));
+using Int4 = int32_t __attribute__((vector_size(16)));
 
 Float4 load(const uint16_t* texel) {
-  Short4 values;
-  std::memcpy(&values, texel, sizeof values);
-  return __builtin_convertvector(values, Float4);
+  uint64_t bytes;
+  std::memcpy(&bytes, texel, sizeof bytes);
+  // Widened by zeros in between, which compilers make one instruction of; of a conversion in one step they do
+  // not.
+  const auto values = reinterpret_cast<Short8>(Long2{bytes, 0});
+  const auto wide = __builtin_shufflevector(values, Short8{}, 0, 8, 1, 9, 2, 10, 3, 11);
+  return __builtin_convertvector(reinterpret_cast<Int4>(wide), Float4);
 }
 
 /// The part of 0..1 that a coordinate falls on.
@@ -42,16 +48,11 @@ Pair pair_at(float t, int32_t size, TextureWrap wrap) {
   const float place = t * static_cast<float>(size) - 0.5f;  // above -1
   const auto first = static_cast<int32_t>(place + 1) - 1;
   Pair pair{first, first + 1, place - static_cast<float>(first)};
-  if (wrap == TextureWrap::repeat) {
-    if (pair.first < 0) pair.first += size;
-    if (pair.second >= size) pair.second -= size;
-  } else {
-    pair.first = std::max(pair.first, 0);
-    pair.second = std::min(pair.second, size - 1);
-  }
-  // A coordinate that rounds to the far end.
-  pair.first = std::min(pair.first, size - 1);
-  pair.second = std::min(pair.second, size - 1);
+  if (static_cast<uint32_t>(first) < static_cast<uint32_t>(size - 1)) [[likely]]
+    return pair;
+  // At the first or the last texel; a coordinate may round to the far end.
+  pair.first = first < 0 ? wrap == TextureWrap::repeat ? size - 1 : 0 : size - 1;
+  pair.second = first < 0 || wrap == TextureWrap::repeat ? 0 : size - 1;
   return pair;
 }
 
@@ -73,12 +74,17 @@ Cover cover(int64_t at, int64_t from, int64_t to) {
 
 }  // namespace
 
+Result<TextureLevels::Level> TextureLevels::Level::make(int64_t width, int64_t height, Context& ctx) {
+  Level level;
+  level.width = static_cast<int32_t>(width);
+  level.height = static_cast<int32_t>(height);
+  VOX_TRY(level.texels,
+          Buffer::allocate(static_cast<uint64_t>(width * height) * 8, "a texture's levels", ctx));
+  return level;
+}
+
 Result<TextureLevels::Level> TextureLevels::halved(const Level& from, Context& ctx) {
-  Level to;
-  to.width = std::max(1, from.width / 2);
-  to.height = std::max(1, from.height / 2);
-  VOX_TRY(to.texels,
-          Buffer::allocate(static_cast<uint64_t>(to.width) * to.height * 8, "a texture's levels", ctx));
+  VOX_TRY(Level to, Level::make(std::max(1, from.width / 2), std::max(1, from.height / 2), ctx));
   const uint64_t area = static_cast<uint64_t>(from.width) * static_cast<uint64_t>(from.height);
   VOX_CHECK(parallel_for(ctx, to.height, [&](int64_t y) -> Status {
     const Cover rows = cover(y, from.height, to.height);
@@ -92,7 +98,7 @@ Result<TextureLevels::Level> TextureLevels::halved(const Level& from, Context& c
               uint64_t{rows.weights[static_cast<size_t>(j)]} * columns.weights[static_cast<size_t>(i)];
           for (size_t c = 0; c < 4; ++c) sum[c] += weight * texel[c];
         }
-      auto* out = const_cast<uint16_t*>(to.at(x, y));
+      uint16_t* out = to.at(x, y);
       for (size_t c = 0; c < 4; ++c) out[c] = static_cast<uint16_t>((sum[c] + area / 2) / area);
     }
     return {};
@@ -102,19 +108,16 @@ Result<TextureLevels::Level> TextureLevels::halved(const Level& from, Context& c
 
 Result<TextureLevels> TextureLevels::make(const Texture& texture, bool opaque, Context& ctx) {
   TextureLevels out;
-  Level first;
-  first.width = static_cast<int32_t>(texture.width);
-  first.height = static_cast<int32_t>(texture.height);
-  const int64_t texels = texture.width * texture.height;
-  VOX_TRY(first.texels, Buffer::allocate(static_cast<uint64_t>(texels) * 8, "a texture's levels", ctx));
+  VOX_TRY(Level first, Level::make(texture.width, texture.height, ctx));
   const auto& linear = light_tables().linear;
-  auto* to = reinterpret_cast<uint16_t*>(first.texels->data());
   const uint8_t* from = texture.data();
-  for (int64_t i = 0; i < texels; ++i, from += 4, to += 4) {
-    const uint32_t alpha = opaque ? 255 : from[3];
-    for (size_t c = 0; c < 3; ++c) to[c] = static_cast<uint16_t>((linear[from[c]] * alpha + 127) / 255);
-    to[3] = static_cast<uint16_t>(alpha * 257);
-  }
+  for (int64_t y = 0; y < texture.height; ++y)
+    for (int64_t x = 0; x < texture.width; ++x, from += 4) {
+      uint16_t* to = first.at(x, y);
+      const uint32_t alpha = opaque ? 255 : from[3];
+      for (size_t c = 0; c < 3; ++c) to[c] = static_cast<uint16_t>((linear[from[c]] * alpha + 127) / 255);
+      to[3] = static_cast<uint16_t>(alpha * 257);
+    }
   out.levels_.push_back(std::move(first));
   while (out.levels_.back().width > 1 || out.levels_.back().height > 1) {
     VOX_TRY(Level next, halved(out.levels_.back(), ctx));

@@ -103,13 +103,15 @@ class MeshSurface : public SurfaceSource {
         VOX_TRY(more, parts.next(part, ctx));
         if (more) jobs.push_back(std::move(part));
       }
-      made.assign(jobs.size(), {});
+      // Those of two batches ago keep their memory.
+      made.resize(jobs.size());
+      for (auto& voxels : made) voxels.clear();
       VOX_CHECK(parallel_for(ctx, static_cast<int64_t>(jobs.size()) + 1, [&](int64_t i) -> Status {
         if (i == 0) return hand_over(ready, sink, last_place);
         return make(jobs[static_cast<size_t>(i - 1)], made[static_cast<size_t>(i - 1)]);
       }));
       ctx.progress(std::ldexp(static_cast<double>(last_place), -3 * all_.bits));
-      ready = std::move(made);
+      std::swap(ready, made);
     }
     return {};
   }

@@ -24,9 +24,8 @@ Float4 float4(const glm::vec4& v) {
   return Float4{v.x, v.y, v.z, v.w};
 }
 
-uint16_t light16(float value) {
-  return static_cast<uint16_t>(std::min(value, static_cast<float>(full_light)) + 0.5f);
-}
+using Int4 = int32_t __attribute__((vector_size(16)));
+constexpr Float4 all_light = {full_light, full_light, full_light, full_light};
 
 /// A convex polygon: a triangle has three corners, and each of six planes adds one at most.
 struct Polygon {
@@ -94,33 +93,28 @@ TriangleShade::TriangleShade(const VoxelScene& scene, uint32_t index, const std:
     const double ss = dot(s, s), tt = dot(t, t), st = dot(s, t), half = (ss - tt) / 2;
     detail_ = texture_->detail((ss + tt) / 2 + std::sqrt(half * half + st * st));
   } else if (!tinted_) {
-    plain_ = shade(Float4{1, 1, 1, 1} * static_cast<float>(full_light), Float4{1, 1, 1, 1});
+    plain_ = shade(all_light, Float4{1, 1, 1, 1});
   }
 }
 
 Shade TriangleShade::shade(Float4 texel, Float4 tint) const {
   tint *= float4(material_->color);
-  Shade out;
   const float alpha = texel[3] * tint[3] / static_cast<float>(full_light);
-  switch (material_->alpha_mode) {
-    case AlphaMode::opaque:
-      out.cover = 255;
-      break;
-    case AlphaMode::mask:
-      if (alpha < material_->alpha_cutoff) return out;
-      out.cover = 255;
-      break;
-    case AlphaMode::blend:
-      out.cover = static_cast<uint8_t>(std::min(alpha, 1.0f) * 255 + 0.5f);
-      if (out.cover == 0) return out;
-      break;
+  uint8_t cover = 255;
+  if (material_->alpha_mode == AlphaMode::mask) {
+    if (alpha < material_->alpha_cutoff) return {};
+  } else if (material_->alpha_mode == AlphaMode::blend) {
+    cover = static_cast<uint8_t>(std::min(alpha, 1.0f) * 255 + 0.5f);
+    if (cover == 0) return {};
   }
   // Colours come multiplied by the texture's alpha.
   if (texel[3] > 0 && texel[3] < static_cast<float>(full_light))
     texel *= static_cast<float>(full_light) / texel[3];
   texel *= tint;
-  for (int c = 0; c < 3; ++c) out.light[static_cast<size_t>(c)] = light16(texel[c]);
-  return out;
+  texel = texel < all_light ? texel : all_light;
+  const Int4 light = __builtin_convertvector(texel + 0.5f, Int4);
+  return {static_cast<uint16_t>(light[0]), static_cast<uint16_t>(light[1]), static_cast<uint16_t>(light[2]),
+          cover};
 }
 
 Shade TriangleShade::at(int x, int y, int z) const {
@@ -132,7 +126,7 @@ Shade TriangleShade::at(int x, int y, int z) const {
     const double sum = a + b + c;
     b /= sum, c /= sum;
   }
-  Float4 texel = Float4{1, 1, 1, 1} * static_cast<float>(full_light), tint{1, 1, 1, 1};
+  Float4 texel = all_light, tint{1, 1, 1, 1};
   if (texture_)
     texel = texture_->sample(u_[0] + b * u_[1] + c * u_[2], v_[0] + b * v_[1] + c * v_[2], material_->wrap_u,
                              material_->wrap_v, detail_);

@@ -21,10 +21,18 @@ struct VoxelScene {
   std::vector<int32_t> texture_of;  ///< of a material: index into textures, or -1
 };
 
-/// Linear light in 16 bits, and how much of the area is there, 1..255; 0 = nothing is.
-struct Shade {
-  std::array<uint16_t, 3> light{};
-  uint8_t cover = 0;
+/// Linear light in 16 bits, and how much of the area is there, 1..255; 0 = nothing is. In one register: parts
+/// of a word that are written one by one wait for each other when it is read.
+class Shade {
+ public:
+  Shade() = default;
+  Shade(uint16_t r, uint16_t g, uint16_t b, uint8_t cover)
+      : bits_(uint64_t{cover} << 48 | uint64_t{b} << 32 | uint32_t{g} << 16 | r) {}
+  uint8_t cover() const { return static_cast<uint8_t>(bits_ >> 48); }
+  uint16_t light(size_t channel) const { return static_cast<uint16_t>(bits_ >> (16 * channel)); }
+
+ private:
+  uint64_t bits_ = 0;
 };
 
 /// What is the same for all voxels of a triangle. Places are counted in voxels from `lo`.
@@ -59,9 +67,9 @@ class ShadeMean {
  public:
   void add(const Shade& shade, double area) {
     // Whatever is there counts; order does not matter.
-    const uint64_t weight = (1 + static_cast<uint64_t>(area * 65536)) * shade.cover;
+    const uint64_t weight = (1 + static_cast<uint64_t>(area * 65536)) * shade.cover();
     weight_ += weight;
-    for (size_t c = 0; c < 3; ++c) light_[c] += static_cast<unsigned __int128>(weight) * shade.light[c];
+    for (size_t c = 0; c < 3; ++c) light_[c] += static_cast<unsigned __int128>(weight) * shade.light(c);
   }
   bool empty() const { return weight_ == 0; }
   std::array<uint16_t, 3> light() const {

@@ -13,9 +13,16 @@ size_t most_pairs(int bits) {
   return std::max<size_t>(size_t{1} << (3 * bits), 4096);
 }
 
-Rgb stored(const std::array<uint16_t, 3>& light) {
-  const auto& table = light_tables().stored;
-  return {table[light[0]], table[light[1]], table[light[2]]};
+Rgb stored(uint16_t r, uint16_t g, uint16_t b) {
+  static const uint8_t* const table = light_tables().stored.data();
+  return {table[r], table[g], table[b]};
+}
+Rgb stored(const Shade& shade) {
+  return stored(shade.light(0), shade.light(1), shade.light(2));
+}
+Rgb stored(const ShadeMean& mean) {
+  const auto light = mean.light();
+  return stored(light[0], light[1], light[2]);
 }
 
 }  // namespace
@@ -68,9 +75,9 @@ void TileWork::one_voxel(const VoxelScene& scene, const Cube& cube, std::span<co
             cube, [] {},
             [&](uint64_t) {
               const TriangleShade shade(scene, triangle, cube.lo);
-              if (const Shade seen = shade.at(0, 0, 0); seen.cover) mean.add(seen, shade.area_in(0, 0, 0));
+              if (const Shade seen = shade.at(0, 0, 0); seen.cover()) mean.add(seen, shade.area_in(0, 0, 0));
             });
-  if (!mean.empty()) out.push_back({first_place(cube), stored(mean.light())});
+  if (!mean.empty()) out.push_back({first_place(cube), stored(mean)});
 }
 
 /// False where there are too many pairs.
@@ -123,6 +130,13 @@ void TileWork::sort(int code_bits) {
 
 void TileWork::color(const Cube& cube, std::vector<SurfaceVoxel>& out) const {
   const uint64_t first = first_place(cube);
+  out.reserve(out.size() + count_);
+  const auto put = [&](uint32_t code, Rgb color) {
+    // In place: a voxel that is put together elsewhere is read before its parts are there.
+    SurfaceVoxel& voxel = out.emplace_back();
+    voxel.place = first | code;
+    voxel.color = color;
+  };
   for (size_t i = 0; i < count_;) {
     const auto code = static_cast<uint32_t>(pairs_[i] >> 32);
     const glm::ivec3 at = morton_place(code);
@@ -132,14 +146,13 @@ void TileWork::color(const Cube& cube, std::vector<SurfaceVoxel>& out) const {
     size_t end = i + 1;
     while (end < count_ && pairs_[end] >> 32 == code) ++end;
     if (end == i + 1) {
-      if (const Shade seen = shade_of(i).at(at.x, at.y, at.z); seen.cover)
-        out.push_back({first | code, stored(seen.light)});
+      if (const Shade seen = shade_of(i).at(at.x, at.y, at.z); seen.cover()) put(code, stored(seen));
     } else {
       ShadeMean mean;
       for (size_t pair = i; pair < end; ++pair)
-        if (const Shade seen = shade_of(pair).at(at.x, at.y, at.z); seen.cover)
+        if (const Shade seen = shade_of(pair).at(at.x, at.y, at.z); seen.cover())
           mean.add(seen, shade_of(pair).area_in(at.x, at.y, at.z));
-      if (!mean.empty()) out.push_back({first | code, stored(mean.light())});
+      if (!mean.empty()) put(code, stored(mean));
     }
     i = end;
   }
