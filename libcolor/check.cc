@@ -42,7 +42,7 @@ class Checker {
 
   Status check_dag() {
     std::vector<Below> below(view_.leaf_count);
-    VOX_CHECK(reservation_.add(below.size() * sizeof(Below), "counts of voxels"));
+    VOX_CHECK(reservation_.add(below.size() * sizeof(Below), "a table of voxels below nodes"));
     for (uint64_t i = 0; i < view_.leaf_count; ++i) {
       const uint64_t leaf = view_.leaves[i];
       if (leaf == 0 && params_.leaf_voxels > 0) return bad(fmt::format("chunk LEAF, word {}: no voxels", i));
@@ -63,7 +63,7 @@ class Checker {
   /// The nodes of a height, one after the other; what is below each.
   Result<std::vector<Below>> check_nodes(int h, const std::vector<Below>& children) {
     const uint64_t words = view_.words[static_cast<size_t>(h)];
-    VOX_CHECK(reservation_.add(words * sizeof(Below), "counts of voxels"));
+    VOX_CHECK(reservation_.add(words * sizeof(Below), "a table of voxels below nodes"));
     std::vector<Below> below(words);
     for (uint64_t at = 0; at < words;) {
       const auto broken = [&](const std::string& rule) {

@@ -153,7 +153,7 @@ Status DagBuilder::check_memory() {
   for (size_t h = 0; h < dag_.nodes.size(); ++h)
     bytes += dag_.nodes[h].capacity() * sizeof(uint32_t) + unique_nodes_[h].bytes();
   if (bytes <= reserved_) return {};
-  VOX_CHECK(reservation_.add(bytes - reserved_, "the nodes of the DAG"));
+  VOX_CHECK(reservation_.add(bytes - reserved_, "the DAG"));
   reserved_ = bytes;
   return {};
 }

@@ -29,7 +29,7 @@ class ColorWriter {
   Status begin() {
     batch_ = static_cast<size_t>(2 * ctx_.threads);
     constexpr uint64_t part_bytes = uint64_t{part_colors} * (sizeof(Rgb) + 4);  // and what becomes of them
-    VOX_CHECK(reservation_.add(batch_ * part_bytes, "colors that are being encoded"));
+    VOX_CHECK(reservation_.add(batch_ * part_bytes, "room for colors"));
     colors_.reserve(batch_ << part_log2);
     return {};
   }
@@ -115,7 +115,7 @@ Result<Report> encode(SurfaceSource& source, const Options& options, const ByteS
   VOX_CHECK(source.read(ctx, [&](std::span<const SurfaceVoxel> run) -> Status {
     VOX_CHECK(builder.add(run));
     if (options.colors == Colors::all) {
-      VOX_CHECK(reservation.add(run.size() * sizeof(Rgb), "the colors of all voxels"));
+      VOX_CHECK(reservation.add(run.size() * sizeof(Rgb), "room for all colors"));
       for (const SurfaceVoxel& voxel : run) held.push_back(voxel.color);
     } else {
       for (const SurfaceVoxel& voxel : run) VOX_CHECK(colors.add(voxel.color));

@@ -77,7 +77,7 @@ class Walk {
 Result<std::vector<Rgb>> node_colors(const Dag& dag, std::span<const Rgb> voxels, Reservation& memory) {
   std::vector<Rgb> colors;
   if (voxels.empty()) return colors;
-  VOX_CHECK(memory.add(dag.color_count * sizeof(Rgb), "the colors of all nodes"));
+  VOX_CHECK(memory.add(dag.color_count * sizeof(Rgb), "room for the colors of nodes"));
   colors.reserve(dag.color_count);
   Walk(dag, voxels, colors).node(dag.height, dag.root);
   return colors;
