@@ -203,6 +203,7 @@ Result<BrickSkips> BrickSkips::create(const BrickRanges& ranges, const TransferF
   skips.first_ = skips.slice_ + skips.row_ + 1;
   const uint64_t bytes = static_cast<uint64_t>(skips.slice_ * (n.z + 2)) + slack;
   VOX_TRY(skips.memory_, Buffer::allocate(bytes, "the map of what can be seen", ctx));
+  skips.size_ = static_cast<int64_t>(bytes);
   auto* const first = reinterpret_cast<uint8_t*>(skips.memory_->data());
   std::fill_n(first, bytes, uint8_t{255});
   uint8_t* const map = first + skips.first_;

@@ -2,6 +2,7 @@
 #pragma once
 
 #include <memory>
+#include <span>
 
 #include "librender/grid.h"
 #include "librender/transfer.h"
@@ -54,6 +55,10 @@ class BrickSkips {
   /// Of brick (0, 0, 0); there are bricks around the volume, too, one deep, which cannot be seen. At least 3
   /// bytes are behind the last.
   const uint8_t* distances() const { return reinterpret_cast<const uint8_t*>(memory_->data()) + first_; }
+  /// All of the map.
+  std::span<const uint8_t> bytes() const {
+    return {reinterpret_cast<const uint8_t*>(memory_->data()), static_cast<size_t>(size_)};
+  }
   /// From brick to brick along y, and along z.
   int64_t row() const { return row_; }
   int64_t slice() const { return slice_; }
@@ -62,7 +67,7 @@ class BrickSkips {
 
  private:
   std::shared_ptr<Buffer> memory_;
-  int64_t first_ = 0, row_ = 0, slice_ = 0, visible_ = 0;
+  int64_t first_ = 0, row_ = 0, slice_ = 0, visible_ = 0, size_ = 0;
 };
 
 }  // namespace voxkit::render

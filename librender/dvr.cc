@@ -22,12 +22,6 @@ Status check_scalar(const VolumeInfo& info) {
                            ": expected a scalar volume for direct volume rendering");
 }
 
-/// Whether rays may look into a volume in memory with 32-bit numbers of voxels.
-bool is_direct(const DenseGrid& grid) {
-  const Index3& dims = grid.info().dims;
-  return std::min({dims.x, dims.y, dims.z}) >= 2 && dims.x * dims.y * dims.z < most_dense_voxels;
-}
-
 Result<DvrParams> dvr_params(const VolumeInfo& info, const Camera& camera, const DvrOptions& options,
                              const TransferFunction& transfer, const BrickSkips& skips) {
   CastOptions cast_options;
@@ -69,32 +63,6 @@ Result<DvrParams> dvr_params(const VolumeInfo& info, const Camera& camera, const
   return params;
 }
 
-/// The size of a frame, its counts, and the pixels that cannot see the volume.
-Status begin_frame(const CastParams& cast, bool details, DvrFrame& frame, Context& ctx) {
-  frame.width = cast.width;
-  frame.height = cast.height;
-  frame.pixels.resize(static_cast<size_t>(cast.width) * static_cast<size_t>(cast.height));
-  frame.details.resize(details ? frame.pixels.size() : 0);
-  frame.rays = frame.pixels.size();
-  frame.rays_hit = frame.cells_visited = frame.blocks_touched = frame.bytes_touched = frame.samples = 0;
-  frame.bricks_decoded = 0;
-  return parallel_for(ctx, cast.height, [&](int64_t y) -> Status {
-    const bool row = y >= cast.top && y < cast.bottom;
-    const int left = row ? std::min(cast.left, cast.width) : cast.width,
-              right = row ? std::max(left, cast.right) : cast.width;
-    const auto blank = [&](int x0, int x1) {
-      for (auto i = static_cast<size_t>(y * cast.width + x0); i < static_cast<size_t>(y * cast.width + x1);
-           ++i) {
-        frame.pixels[i] = {};
-        if (details) frame.details[i] = {};
-      }
-    };
-    blank(0, left);
-    blank(right, cast.width);
-    return {};
-  });
-}
-
 }  // namespace
 
 Result<DvrVolume> DvrVolume::open(std::shared_ptr<const DenseGrid> grid, Context& ctx) {
@@ -124,9 +92,41 @@ Result<DvrScene> DvrScene::create(std::shared_ptr<const DvrVolume> volume, Trans
   return DvrScene(std::move(volume), std::move(transfer), std::move(skips));
 }
 
-Status DvrScene::draw(const Camera& camera, const DvrOptions& options, DvrFrame& frame, Context& ctx) const {
-  const VolumeInfo& info = volume_->info();
-  VOX_TRY(const DvrParams params, dvr_params(info, camera, options, transfer_, skips_));
+bool is_direct(const VolumeInfo& info) {
+  const Index3& dims = info.dims;
+  return std::min({dims.x, dims.y, dims.z}) >= 2 && dims.x * dims.y * dims.z < most_dense_voxels;
+}
+
+Status begin_frame(const DvrJob& job, DvrFrame& frame, Context& ctx) {
+  const CastParams& cast = job.params.cast;
+  const bool details = job.details;
+  frame.width = cast.width;
+  frame.height = cast.height;
+  frame.pixels.resize(static_cast<size_t>(cast.width) * static_cast<size_t>(cast.height));
+  frame.details.resize(details ? frame.pixels.size() : 0);
+  frame.rays = frame.pixels.size();
+  frame.rays_hit = frame.cells_visited = frame.blocks_touched = frame.bytes_touched = frame.samples = 0;
+  frame.bricks_decoded = 0;
+  return parallel_for(ctx, cast.height, [&](int64_t y) -> Status {
+    const bool row = y >= cast.top && y < cast.bottom;
+    const int left = row ? std::min(cast.left, cast.width) : cast.width,
+              right = row ? std::max(left, cast.right) : cast.width;
+    const auto blank = [&](int x0, int x1) {
+      for (auto i = static_cast<size_t>(y * cast.width + x0); i < static_cast<size_t>(y * cast.width + x1);
+           ++i) {
+        frame.pixels[i] = {};
+        if (details) frame.details[i] = {};
+      }
+    };
+    blank(0, left);
+    blank(right, cast.width);
+    return {};
+  });
+}
+
+Result<DvrJob> dvr_job(const DvrScene& scene, const Camera& camera, const DvrOptions& options) {
+  VOX_TRY(const DvrParams params,
+          dvr_params(scene.volume().info(), camera, options, scene.transfer(), scene.skips()));
   DvrJob job{
       .params = params,
       .gradient = !options.lit && options.modulate <= 0    ? DvrGradient::none
@@ -137,12 +137,17 @@ Status DvrScene::draw(const Camera& camera, const DvrOptions& options, DvrFrame&
       .shown = nullptr,
   };
   // Gradients from neighbouring rays need what these have there, seen or not.
-  if (options.skip && job.gradient != DvrGradient::neighbour) job.shown = &transfer_;
+  if (options.skip && job.gradient != DvrGradient::neighbour) job.shown = &scene.transfer();
+  return job;
+}
+
+Status DvrScene::draw(const Camera& camera, const DvrOptions& options, DvrFrame& frame, Context& ctx) const {
+  VOX_TRY(const DvrJob job, dvr_job(*this, camera, options));
   const auto start = std::chrono::steady_clock::now();
-  VOX_CHECK(begin_frame(params.cast, options.details, frame, ctx));
-  if (volume_->dense() && is_direct(*volume_->dense())) {
+  VOX_CHECK(begin_frame(job, frame, ctx));
+  if (volume_->dense() && is_direct(volume_->info())) {
     VOX_CHECK(draw_dense(*volume_->dense(), job, frame, ctx));
-  } else if (info.format == VoxelFormat::float32) {
+  } else if (volume_->info().format == VoxelFormat::float32) {
     VOX_CHECK(draw_bricks<float>(*volume_, job, frame, ctx));
   } else {
     VOX_CHECK(draw_bricks<uint16_t>(*volume_, job, frame, ctx));

@@ -74,6 +74,8 @@ class DvrScene {
   Status draw(const Camera& camera, const DvrOptions& options, DvrFrame& frame, Context& ctx) const;
 
   const DvrVolume& volume() const { return *volume_; }
+  const TransferFunction& transfer() const { return transfer_; }
+  const BrickSkips& skips() const { return skips_; }
   /// Bricks that samples may show.
   int64_t visible_bricks() const { return skips_.visible(); }
 

@@ -4,6 +4,8 @@
 #include <mutex>
 
 #include "formats/parallel.h"
+#include "librender/brick_sampler.h"
+#include "librender/dense_sampler.h"
 
 namespace voxkit::render {
 namespace {
@@ -23,30 +25,14 @@ template <class Lanes>
                                         DvrFrame& frame, bool details, Counts& count) {
   const CastParams& cast = params.cast;
   count.bricks += found.bricks;
-  for (int i = 0; i < PortableLanes::count; ++i) {
-    const int px = x + i % PortableLanes::width, py = y + i / PortableLanes::width;
+  for (int i = 0; i < Lanes::count; ++i) {
+    const int px = x + i % Lanes::width, py = y + i / Lanes::width;
     if (px >= cast.right || py >= cast.bottom) continue;
     const auto at = static_cast<size_t>(py) * static_cast<size_t>(cast.width) + static_cast<size_t>(px);
-    Pixel pixel;
-    for (int c = 0; c < 3; ++c) pixel.colour[c] = found.colour[c][i];
-    pixel.colour[3] = 1 - found.through[i];
     PixelDetail detail;
-    detail.cells = static_cast<uint32_t>(found.samples[i]);
-    if (found.hit[i] != 0) {
-      const double t = (found.first[i] + params.middle) * params.step;
-      pixel.distance = static_cast<float>(t * world_length(cast, px, py));
-      if (details) {
-        const PixelRay ray = ray_through(cast, px, py);
-        for (int a = 0; a < 3; ++a) {
-          const double v = std::floor(cast.origin[a] + ray.direction[a] * t);
-          const double most = static_cast<double>(cast.dims[a] - 1);
-          detail.voxel[a] = static_cast<int32_t>(v < 0 ? 0 : v > most ? most : v);
-        }
-      }
-      ++count.hit;
-    }
+    finish_pixel(params, found, i, px, py, details, frame.pixels[at], detail);
+    count.hit += found.hit[i] != 0;
     count.samples += detail.cells;
-    frame.pixels[at] = pixel;
     if (details) frame.details[at] = detail;
   }
 }
@@ -54,8 +40,8 @@ template <class Lanes>
 template <class Lanes, DvrGradient kind, class Sampler>
 [[gnu::always_inline]] inline void draw_tile(const DvrParams& params, Sampler& sampler, const Tile& tile,
                                              DvrFrame& frame, bool details, Counts& count) {
-  for (int y = tile.y0; y < tile.y1; y += PortableLanes::height)
-    for (int x = tile.x0; x < tile.x1; x += PortableLanes::width) {
+  for (int y = tile.y0; y < tile.y1; y += Lanes::height)
+    for (int x = tile.x0; x < tile.x1; x += Lanes::width) {
       DvrPixels<Lanes> found;
       march<Lanes, Sampler, kind>(params, sampler, x, y, found);
       keep(params, found, x, y, frame, details, count);

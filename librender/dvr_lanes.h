@@ -70,6 +70,13 @@ struct VectorLanes : OneLane {
   VOX_HD_HOT static void set(Vector& x, int lane, Value value) {
     x[lane] = value;
   }
+  /// What one lane has, for all of them.
+  template <class Vector>
+  VOX_HD_HOT static auto broadcast(const Vector& x, int lane) {
+    return x[lane];
+  }
+  /// Waits until all lanes have come here, and see what the others wrote.
+  VOX_HD_HOT static void sync() {}
   /// Bit i: whether the condition holds in lane i.
   VOX_HD_HOT static uint32_t bits(const Mask& condition) {
     uint32_t set = 0;

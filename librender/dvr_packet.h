@@ -119,7 +119,7 @@ struct DvrPlaces {
   Real at[3];  ///< from the middle of voxel 0 on, not clamped
   Vec<Real> clamped;
   Int cell[3], brick[3];
-  Int place;     ///< of the brick in the map of distances
+  Int place;          ///< of the brick in the map of distances
   Int distance = {};  ///< to bricks that can be seen
 };
 template <class Lanes>
@@ -313,6 +313,29 @@ VOX_HD_HOT void march(const DvrParams& params, Sampler& sampler, int x, int y, D
       alive = alive & (pixels.through > transparent);
     }
     k += depths;
+  }
+}
+
+/// What lane i of this thread, the pixel (x, y), found. `detail`: the samples, and where the first one that
+/// was seen is if that is asked for and there is one.
+template <class Lanes>
+VOX_HD_HOT void finish_pixel(const DvrParams& params, const DvrPixels<Lanes>& found, int i, int x, int y,
+                             bool where, Pixel& pixel, PixelDetail& detail) {
+  for (int c = 0; c < 3; ++c) pixel.colour[c] = Lanes::get(found.colour[c], i);
+  pixel.colour[3] = 1 - Lanes::get(found.through, i);
+  pixel.distance = __builtin_inff();
+  detail = {};
+  detail.cells = static_cast<uint32_t>(Lanes::get(found.samples, i));
+  if (!Lanes::get(found.hit, i)) return;
+  const CastParams& cast = params.cast;
+  const double t = (Lanes::get(found.first, i) + params.middle) * params.step;
+  pixel.distance = static_cast<float>(t * world_length(cast, x, y));
+  if (!where) return;
+  const PixelRay ray = ray_through(cast, x, y);
+  for (int a = 0; a < 3; ++a) {
+    const double v = std::floor(cast.origin[a] + ray.direction[a] * t);
+    const double most = static_cast<double>(cast.dims[a] - 1);
+    detail.voxel[a] = static_cast<int32_t>(v < 0 ? 0 : v > most ? most : v);
   }
 }
 

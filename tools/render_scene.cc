@@ -18,12 +18,12 @@ tl::unexpected<Error> named(Error error, const std::string& name) {
 }
 
 /// For direct volume rendering: from the compressed form where there is one.
-Result<std::shared_ptr<const DvrVolume>> open_volume(Input& input, Run& run) {
+Result<std::shared_ptr<const DvrVolume>> open_volume(Input& input, bool cuda, Run& run) {
   if (is_colour(input.source->info().format))
     return bad_input({}, fmt::format("voxels are {}: expected a scalar volume for --mode dvr",
                                      voxkit::name(input.source->info().format)));
   const auto opened = [&]() -> Result<DvrVolume> {
-    if (input.svmm) {
+    if (input.svmm && !cuda) {  // GPUs have no code for it: they get the voxels
       run.stage("measure");
       return DvrVolume::open(input.svmm, run.ctx);
     }
@@ -40,6 +40,7 @@ Result<std::shared_ptr<const DvrVolume>> open_volume(Input& input, Run& run) {
 
 Status Scene::draw(const Camera& camera, CastOptions options, const DvrOptions& dvr_options, DvrFrame& frame,
                    Context& ctx) const {
+  if (device_dvr) return device_dvr->draw(camera, dvr_options, frame, ctx);
   if (dvr) return dvr->draw(camera, dvr_options, frame, ctx);
   options.range = range;
   if (device) return device->cast(camera, options, frame);
@@ -53,7 +54,7 @@ Result<Scene> open_scene(const std::string& name, const SceneOptions& o, Run& ru
   Scene scene;
   scene.info = input.source->info();
   if (o.dvr) {
-    auto volume = open_volume(input, run);
+    auto volume = open_volume(input, o.cuda, run);
     if (!volume) return named(std::move(volume).error(), name);
     scene.volume = std::move(*volume);
     return scene;

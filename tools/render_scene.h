@@ -6,6 +6,7 @@
 #include <string>
 
 #include "formats/readers.h"
+#include "librender/device_dvr.h"
 #include "librender/device_grid.h"
 #include "librender/dvr.h"
 #include "tools/common/main.h"
@@ -32,6 +33,7 @@ struct Scene {
   // Direct volume rendering.
   std::shared_ptr<const render::DvrVolume> volume;
   std::optional<render::DvrScene> dvr;
+  std::unique_ptr<const render::DeviceDvr> device_dvr;  ///< of `dvr`, which must not be moved then
 
   Status draw(const render::Camera& camera, render::CastOptions options,
               const render::DvrOptions& dvr_options, render::DvrFrame& frame, Context& ctx) const;

@@ -237,7 +237,6 @@ Status check_mode(const Options& o) {
                                                     : nullptr;
     return given == nullptr ? Status{} : bad_usage(fmt::format("{}: expected --mode dvr", given));
   }
-  if (o.device == "cuda") return bad_usage("--mode dvr: not on GPUs: expected --device cpu");
   const bool wrong[] = {o.traversal != "path" || !o.reference_traversal.empty(),
                         o.shade.find("ssao") != std::string::npos, o.depth_antialias, o.lod == "on"};
   const char* const expected[] = {"--traversal: expected path", "--shade: expected none or phong",
@@ -329,6 +328,10 @@ Result<int> work(const Options& o, Run& run) {
     for (Scene* const each : {&scene, other ? &*other : nullptr})
       if (each != nullptr) {
         VOX_TRY(each->dvr, DvrScene::create(each->volume, transfer, run.ctx));
+        if (scene_options.cuda) {
+          run.stage("upload");
+          VOX_TRY(each->device_dvr, DeviceDvr::upload(*each->dvr, run.ctx));
+        }
       }
   }
   const double edge = GridTransform(scene.info).largest_edge();

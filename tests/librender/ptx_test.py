@@ -4,18 +4,15 @@
 Compiles the kernels to PTX with the build's own flags and looks for instructions that would break that. The
 one place that asks for fused multiply-adds is ExactRay, which wants the rounding error of a product.
 
-    ptx_test.py NVCC SOURCE -- FLAGS...
+    ptx_test.py NVCC SOURCE... -- FLAGS...
 """
 import re
 import subprocess
 import sys
 
 
-def main():
-    nvcc, source = sys.argv[1:3]
-    flags = sys.argv[sys.argv.index("--") + 1:]
-    ptx = subprocess.run([nvcc, *flags, "-arch=sm_80", "-ptx", source, "-o", "-"], check=True,
-                         stdout=subprocess.PIPE, text=True).stdout
+def look_through(ptx):
+    """Counts kernels and multiply-adds in ExactRay; collects what is wrong."""
     function, kernels, exact, wrong = "", 0, 0, []
     for line in ptx.splitlines():
         if re.search(r"\.(entry|func)\b", line):
@@ -27,9 +24,22 @@ def main():
                 exact += 1
             else:
                 wrong.append(f"{function}: {line.strip()}")
-    print(f"{kernels} kernels; {exact} multiply-adds in ExactRay; {len(wrong)} elsewhere")
-    print("\n".join(wrong))
-    return 1 if wrong or not kernels or not exact else 0
+    return kernels, exact, wrong
+
+
+def main():
+    end = sys.argv.index("--")
+    nvcc, sources, flags = sys.argv[1], sys.argv[2:end], sys.argv[end + 1:]
+    failed, all_exact = False, 0
+    for source in sources:
+        ptx = subprocess.run([nvcc, *flags, "-arch=sm_80", "-ptx", source, "-o", "-"], check=True,
+                             stdout=subprocess.PIPE, text=True).stdout
+        kernels, exact, wrong = look_through(ptx)
+        print(f"{source}: {kernels} kernels; {exact} multiply-adds in ExactRay; {len(wrong)} elsewhere")
+        print("\n".join(wrong))
+        failed |= bool(wrong) or not kernels
+        all_exact += exact
+    return 1 if failed or not all_exact else 0
 
 
 sys.exit(main())
