@@ -55,6 +55,7 @@ Status check_mesh(Mesh& mesh, const std::string& path) {
   if ((!mesh.uvs.empty() && mesh.uvs.size() != vertices) ||
       (!mesh.colors.empty() && mesh.colors.size() != vertices))
     return bad_input(path, "corrupt mesh: vertices without all of their attributes");
+  const bool had_triangles = !mesh.triangles.empty();
   size_t kept = 0;
   for (size_t i = 0; i < mesh.triangles.size(); ++i) {
     const MeshTriangle triangle = mesh.triangles[i];
@@ -86,7 +87,9 @@ Status check_mesh(Mesh& mesh, const std::string& path) {
     bring_into_range(material.color);
     material.alpha_cutoff = within_one(material.alpha_cutoff);
   }
-  if (kept == 0) return bad_input(path, "a mesh without triangles that have an area");
+  if (kept == 0 && had_triangles) return bad_input(path, "a mesh without triangles that have an area");
+  if (!had_triangles && (vertices == 0 || !has_ending(path, ".ply")))
+    return bad_input(path, "a mesh without triangles");
   return {};
 }
 

@@ -59,6 +59,8 @@ bool is_mesh_name(const std::string& name);
 /// taken as sRGB, those of glTF as linear light, as their specifications or usual writers have it. Materials
 /// of .obj whose texture or opacity map has alpha are masks with a cut-off of 0.5.
 ///
+/// A .ply file without faces gives its vertices, as points, and no triangles.
+///
 /// A texture, a material library or a buffer that the mesh names and that is not there is an error, since the
 /// colours would be wrong in silence. Errors: ErrorCode::input, ErrorCode::limit.
 Result<Mesh> read_mesh(const std::string& path, Context& ctx);

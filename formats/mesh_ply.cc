@@ -233,19 +233,16 @@ class PlyReader {
       : header_(header), numbers_(bytes, header, path), path_(path), ctx_(ctx) {}
 
   Result<MeshParts> read() {
-    bool has_faces = false;
     for (const Element& element : header_.elements) {
       VOX_CHECK(check_count(element));
       if (element.name == "vertex") {
         VOX_CHECK(read_vertices(element));
       } else if (element.name == "face" && element.has(Role::corners)) {
-        has_faces = true;
         VOX_CHECK(read_faces(element));
       } else {
         VOX_CHECK(pass_over(element));
       }
     }
-    if (!has_faces) return bad_input(path_, "a PLY file without faces is no mesh: expected an element face");
     Mesh& mesh = parts_.mesh;
     mesh.materials.resize(1);
     parts_.maps.resize(1);

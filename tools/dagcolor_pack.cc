@@ -22,10 +22,11 @@ struct Options {
 
 void declare(CommandLine& line, Options& o) {
   line.argument("INPUT",
-                "Mesh (.obj .gltf .glb .ply), RGBA or RGB volume, built-in such as menger:5, or .dagc file",
+                "Mesh (.obj .gltf .glb .ply), points (.ply), model (.vox), RGBA or RGB volume, built-in such "
+                "as menger:5, or .dagc file",
                 o.input);
   line.text("-o,--output", "OUT", "Output (.dagc), or -", o.output, true);
-  line.option("--resolution", "N", "Of a mesh: voxels along its longest side (1024)",
+  line.option("--resolution", "N", "Of a mesh or points: voxels along the longest side (1024)",
               integer(o.surface.resolution, 1, int64_t{1} << color::most_levels));
   line.option("--surface", "KIND",
               "Of a mesh: thin: no more voxels than make it tight; conservative: all that it touches (thin)",

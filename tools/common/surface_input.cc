@@ -1,24 +1,44 @@
 #include "tools/common/surface_input.h"
 
+#include "formats/readers.h"
 #include "libcolor/volume_surface.h"
+#include "libcolor/voxel_list.h"
 #include "libcolor/voxelise.h"
 
 namespace voxkit::cli {
+namespace {
 
-Result<std::unique_ptr<color::SurfaceSource>> open_surface(const std::string& name,
-                                                           const SurfaceOptions& options, Context& ctx) {
+using Surface = Result<std::unique_ptr<color::SurfaceSource>>;
+
+/// What is read from a file, as voxels.
+Surface surface_of_mesh(Mesh mesh, const SurfaceOptions& options, Context& ctx) {
+  color::VoxeliseOptions voxelise;
+  voxelise.kind = options.kind;
+  if (options.resolution) voxelise.resolution = *options.resolution;
+  if (mesh.triangles.empty()) return color::surface_of_points(std::move(mesh), voxelise.resolution, ctx);
+  return color::make_surface(std::move(mesh), voxelise, ctx);
+}
+
+Surface open_any(const std::string& name, const SurfaceOptions& options, Context& ctx) {
   if (is_mesh_name(name)) {
-    color::VoxeliseOptions voxelise;
-    voxelise.kind = options.kind;
-    if (options.resolution) voxelise.resolution = *options.resolution;
     VOX_TRY(Mesh mesh, read_mesh(name, ctx));
-    return color::make_surface(std::move(mesh), voxelise, ctx);
+    return surface_of_mesh(std::move(mesh), options, ctx);
   }
   if (options.resolution)
     return fail(ErrorCode::usage, name, "--resolution: has voxels already: expected a mesh");
+  if (has_ending(name, ".vox")) {
+    VOX_TRY(VoxelScene scene, read_magicavoxel(name, ctx));
+    return color::surface_of(std::move(scene), ctx);
+  }
   VOX_TRY(Input input, open_input(name, options.open, ctx));
-  auto surface = color::surface_of(std::move(input.source));
-  if (!surface) return fail(surface.error().code, name, surface.error().what);
+  return color::surface_of(std::move(input.source));
+}
+
+}  // namespace
+
+Surface open_surface(const std::string& name, const SurfaceOptions& options, Context& ctx) {
+  Surface surface = open_any(name, options, ctx);
+  if (!surface && surface.error().file.empty()) return fail(surface.error().code, name, surface.error().what);
   return surface;
 }
 
