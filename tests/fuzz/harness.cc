@@ -6,12 +6,14 @@
 
 #include <algorithm>
 #include <array>
+#include <cmath>
 #include <cstdlib>
 #include <cstring>
 #include <filesystem>
 #include <memory>
 #include <vector>
 
+#include "formats/mesh.h"
 #include "tests/fuzz/seeds.h"
 
 namespace voxkit::fuzz {
@@ -127,6 +129,28 @@ Verdict read_source(const std::function<SourceResult(Context&)>& open) {
   return verdict;
 }
 
+/// Reads a mesh and looks at all of it.
+Verdict read_mesh_file(const std::string& path) {
+  MemoryBudget memory(memory_limit);
+  Context ctx;
+  ctx.memory = &memory;
+  Verdict verdict{true, {}};
+  if (const auto mesh = read_mesh(path, ctx); !mesh) {
+    verdict = judge(mesh.error());
+  } else {
+    if (mesh->triangles.empty()) return fault("a mesh without triangles");
+    for (const MeshTriangle& triangle : mesh->triangles)
+      for (const uint32_t v : triangle.vertices)
+        if (v >= mesh->positions.size() || !std::isfinite(mesh->positions[v].x + mesh->positions[v].z))
+          return fault("a corner that is not there");
+    for (const glm::vec4& color : mesh->colors)
+      if (!(color.r >= 0 && color.b <= 1)) return fault("a colour out of range");
+  }
+  if (verdict.fault.empty() && !memory.reserve(memory_limit, "all of it"))
+    return fault("reserved memory was not given back");
+  return verdict;
+}
+
 class MemoryStream final : public InputStream {
  public:
   explicit MemoryStream(Input input) : input_(input) { name_ = "input"; }
@@ -232,6 +256,19 @@ Verdict read_dicom(Input input) {
       [&](Context& ctx) { return open_dicom(std::filesystem::path(path).parent_path().string(), ctx); });
 }
 
+Verdict read_mesh_ply(Input input) {
+  return read_mesh_file(put(input, "in.ply"));
+}
+
+Verdict read_mesh_gltf(Input input) {
+  const bool binary = input.size() > 4 && std::memcmp(input.data(), "glTF", 4) == 0;
+  return read_mesh_file(put(input, binary ? "in.glb" : "in.gltf"));
+}
+
+Verdict read_mesh_obj(Input input) {
+  return read_mesh_file(put(input, "in.obj"));
+}
+
 const std::vector<Reader>& readers() {
   static const std::vector<Reader> all{
       {"nrrd", nullptr, read_nrrd, nrrd_seeds},
@@ -243,6 +280,9 @@ const std::vector<Reader>& readers() {
       {"image", "image_stack", read_image, image_seeds},
       {"openvdb", "openvdb", read_openvdb, openvdb_seeds},
       {"dicom", "dicom", read_dicom, dicom_seeds},
+      {"mesh_ply", nullptr, read_mesh_ply, mesh_ply_seeds},
+      {"mesh_gltf", "mesh", read_mesh_gltf, mesh_gltf_seeds},
+      {"mesh_obj", "mesh", read_mesh_obj, mesh_obj_seeds},
   };
   return all;
 }

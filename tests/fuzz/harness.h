@@ -35,6 +35,10 @@ Verdict read_image(Input input);
 Verdict read_openvdb(Input input);
 /// A folder of one slice.
 Verdict read_dicom(Input input);
+Verdict read_mesh_ply(Input input);
+/// GLB where it starts so.
+Verdict read_mesh_gltf(Input input);
+Verdict read_mesh_obj(Input input);
 
 struct Reader {
   const char* name;    ///< also of the fuzz target

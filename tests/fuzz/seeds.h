@@ -15,5 +15,8 @@ std::vector<std::string> bunzip2_seeds();
 std::vector<std::string> image_seeds();
 std::vector<std::string> openvdb_seeds();
 std::vector<std::string> dicom_seeds();
+std::vector<std::string> mesh_ply_seeds();
+std::vector<std::string> mesh_gltf_seeds();
+std::vector<std::string> mesh_obj_seeds();
 
 }  // namespace voxkit::fuzz
