@@ -42,6 +42,7 @@ Result<DvrParams> dvr_params(const VolumeInfo& info, const Camera& camera, const
       .middle = std::max(0.0, std::floor(glm::dot(-rays.eye(), rays.forward()) / step)),
       .length = static_cast<float>(options.step),
       .margin = static_cast<float>(longest) * 0x1p-19f,
+      .shortest = static_cast<float>(longest) * 0x1p-16f,
       .edge = {},
       .voxel = {},
       .light = {},

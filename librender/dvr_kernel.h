@@ -82,20 +82,24 @@ VOX_HD_HOT Interpolated<Real> interpolate(const Real (&v)[8], const Vec<Real>& a
 }
 
 /// The gradient from three samples elsewhere, each off by a way and a difference of values: solves
-/// way . gradient = difference. `accepted`: whether the ways are far enough from lying in a plane; then the
-/// gradient means something.
+/// way . gradient = difference. `accepted`: whether no way is shorter than `shortest`, below which the
+/// rounding of places would show, and the ways are far enough from lying in a plane; then the gradient means
+/// something.
 template <class Real>
 struct Solved {
   Vec<Real> gradient;
   decltype((Real{} < Real{}) & (Real{} < Real{})) accepted;
 };
 template <class Lanes, class Real>
-VOX_HD_HOT Solved<Real> solve_gradient(const Vec<Real> (&way)[3], const Real (&difference)[3]) {
+VOX_HD_HOT Solved<Real> solve_gradient(const Vec<Real> (&way)[3], const Real (&difference)[3],
+                                       float shortest) {
   constexpr float least = 1e-3f;
   const Vec<Real> c12 = cross(way[1], way[2]), c20 = cross(way[2], way[0]), c01 = cross(way[0], way[1]);
   const Real det = dot(way[0], c12);
-  const Real bound = (dot(way[0], way[0]) * dot(way[1], way[1])) * (dot(way[2], way[2]) * (least * least));
-  const auto accepted = (det * det >= bound) & (bound > 0.0f);
+  const Real square[3] = {dot(way[0], way[0]), dot(way[1], way[1]), dot(way[2], way[2])};
+  const Real bound = (square[0] * square[1]) * (square[2] * (least * least));
+  const Real nearest = Lanes::least(square[0], Lanes::least(square[1], square[2]));
+  const auto accepted = (det * det >= bound) & (bound > 0.0f) & (nearest >= shortest * shortest);
   const Real inverse = 1.0f / det;  // of 0: not accepted
   const auto part = [&](const Real& a, const Real& b, const Real& c) {
     return (a * difference[0] + (b * difference[1] + c * difference[2])) * inverse;

@@ -3,6 +3,7 @@
 // device. Nothing here allocates.
 #pragma once
 
+#include "librender/brick_ranges.h"
 #include "librender/cast_kernel.h"
 #include "librender/dvr_kernel.h"
 #include "librender/transfer.h"
@@ -16,6 +17,7 @@ struct DvrParams {
   double middle;    ///< sample 0, about where the volume is
   float length;     ///< the same step in smallest voxel edges, along the camera's axis
   float margin;     ///< more than a sample's place is off by rounding, in voxels
+  float shortest;   ///< way to a sample beside from which a gradient can be had in spite of that
   float edge[3];    ///< smallest edge of a voxel by its edge along each axis
   double voxel[3];  ///< edges of a voxel in the world
   float light[3];   ///< unit vector towards the light, world
@@ -167,9 +169,10 @@ struct DvrSamples {
   Mask taken;   ///< and not yet opaque, and in a brick that can be seen
 };
 
-/// Replaces gradients by those from neighbouring rays, and the other depth, where these determine one.
+/// Replaces gradients by those from neighbouring rays, and the other depth, where these determine one that is
+/// not against that of the cell: a normal is never turned round.
 template <class Lanes>
-VOX_HD_HOT void use_neighbours(DvrSamples<Lanes>& sample, const DvrSamples<Lanes>& other) {
+VOX_HD_HOT void use_neighbours(float shortest, DvrSamples<Lanes>& sample, const DvrSamples<Lanes>& other) {
   using Real = typename Lanes::Real;
   const Vec<Real>& at = sample.place.clamped;
   const Real& value = sample.here.value;
@@ -178,10 +181,11 @@ VOX_HD_HOT void use_neighbours(DvrSamples<Lanes>& sample, const DvrSamples<Lanes
   const Vec<Real> way[3] = {Vec<Real>{beside(at.x), beside(at.y), beside(at.z)} - at,
                             Vec<Real>{below(at.x), below(at.y), below(at.z)} - at, other.place.clamped - at};
   const Real difference[3] = {beside(value) - value, below(value) - value, other.here.value - value};
-  const Solved<Real> solved = solve_gradient<Lanes>(way, difference);
-  const typename Lanes::Mask accepted =
-      solved.accepted & beside(sample.inside) & below(sample.inside) & sample.inside & other.inside;
+  const Solved<Real> solved = solve_gradient<Lanes>(way, difference, shortest);
   Vec<Real>& gradient = sample.here.gradient;
+  const typename Lanes::Mask accepted = solved.accepted & (dot(solved.gradient, gradient) > 0.0f) &
+                                        beside(sample.inside) & below(sample.inside) & sample.inside &
+                                        other.inside;
   gradient.x = accepted ? solved.gradient.x : gradient.x;
   gradient.y = accepted ? solved.gradient.y : gradient.y;
   gradient.z = accepted ? solved.gradient.z : gradient.z;
@@ -301,8 +305,8 @@ VOX_HD_HOT void march(const DvrParams& params, Sampler& sampler, int x, int y, D
     }
     if constexpr (depths > 1) {
       const DvrSamples<Lanes> first = samples[0];
-      use_neighbours<Lanes>(samples[0], samples[1]);
-      use_neighbours<Lanes>(samples[1], first);
+      use_neighbours<Lanes>(params.shortest, samples[0], samples[1]);
+      use_neighbours<Lanes>(params.shortest, samples[1], first);
     }
     awaited = alive;
     for (int i = 0; i < depths; ++i) {

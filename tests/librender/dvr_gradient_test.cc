@@ -8,7 +8,8 @@
 #include <random>
 #include <vector>
 
-#include "librender/dvr_kernel.h"
+#include "librender/dvr_lanes.h"
+#include "librender/dvr_packet.h"
 
 namespace voxkit::render {
 namespace {
@@ -79,7 +80,7 @@ void measure(const Function& f, Errors& analytic, Errors& neighbour) {
       way[i] = {static_cast<float>(ways[i].x), static_cast<float>(ways[i].y), static_cast<float>(ways[i].z)};
       difference[i] = sample(f, at + ways[i]).value - here.value;
     }
-    const auto solved = solve_gradient<OneLane>(way, difference);
+    const auto solved = solve_gradient<OneLane>(way, difference, 0);
     ASSERT_TRUE(solved.accepted);
     rays.push_back(degrees_between(expected, solved.gradient));
   }
@@ -113,7 +114,7 @@ TEST(DvrGradient, OfALinearFunctionIsExact) {
       way[k] = {unit(random), unit(random), unit(random)};
       difference[k] = dot(way[k], g);
     }
-    const auto solved = solve_gradient<OneLane>(way, difference);
+    const auto solved = solve_gradient<OneLane>(way, difference, 0);
     if (!solved.accepted) continue;
     EXPECT_NEAR(solved.gradient.x, g.x, 2e-3);
     EXPECT_NEAR(solved.gradient.y, g.y, 2e-3);
@@ -127,15 +128,76 @@ TEST(DvrGradient, WaysInAPlaneAreRefused) {
       clear{1, 1, 5e-3f};
   for (const auto& last : {none, x, xy, nearly}) {
     const Vec<float> way[3] = {x, y, last};
-    EXPECT_FALSE(solve_gradient<OneLane>(way, difference).accepted);
+    EXPECT_FALSE(solve_gradient<OneLane>(way, difference, 0).accepted);
   }
   const Vec<float> good[3] = {x, y, clear};
-  EXPECT_TRUE(solve_gradient<OneLane>(good, difference).accepted);
-  // Tiny ways, as of a narrow field of view, are as good as long ones.
+  EXPECT_TRUE(solve_gradient<OneLane>(good, difference, 0).accepted);
+  // Tiny ways, as of a narrow field of view, are as good as long ones, but for the rounding of places.
   const Vec<float> tiny[3] = {{1e-4f, 0, 0}, {0, 1e-4f, 0}, {0, 0, 1e-4f}};
-  EXPECT_TRUE(solve_gradient<OneLane>(tiny, difference).accepted);
+  EXPECT_TRUE(solve_gradient<OneLane>(tiny, difference, 0).accepted);
+  EXPECT_TRUE(solve_gradient<OneLane>(tiny, difference, 0.9e-4f).accepted);
+  EXPECT_FALSE(solve_gradient<OneLane>(tiny, difference, 1.1e-4f).accepted);
   const Vec<float> odd[3] = {{NAN, 0, 0}, {0, 1, 0}, {0, 0, 1}};
-  EXPECT_FALSE(solve_gradient<OneLane>(odd, difference).accepted);
+  EXPECT_FALSE(solve_gradient<OneLane>(odd, difference, 0).accepted);
+}
+
+/// A packet's samples of a linear function at two depths, `across` from ray to ray.
+struct Packet {
+  DvrSamples<PortableLanes> first, second;
+};
+Packet packet_of(const glm::dvec3& slope, const glm::dvec3& at, const glm::dvec3& across,
+                 const glm::dvec3& down, const glm::dvec3& ahead, unsigned inside) {
+  Packet packet;
+  for (int depth = 0; depth < 2; ++depth) {
+    auto& s = depth == 0 ? packet.first : packet.second;
+    for (int i = 0; i < 8; ++i) {
+      const glm::vec3 p(at + across * double(i % 4) + down * double(i / 4) + ahead * double(depth));
+      const bool there = inside >> (8 * depth + i) & 1;
+      s.place.clamped.x[i] = p.x, s.place.clamped.y[i] = p.y, s.place.clamped.z[i] = p.z;
+      s.here.value[i] = there ? static_cast<float>(1000 + glm::dot(slope, glm::dvec3(p))) : NAN;
+      s.here.gradient.x[i] = static_cast<float>(slope.x);
+      s.here.gradient.y[i] = static_cast<float>(slope.y);
+      s.here.gradient.z[i] = static_cast<float>(slope.z);
+      s.inside[i] = there ? -1 : 0;
+    }
+  }
+  return packet;
+}
+
+TEST(DvrGradient, NearSingularCasesAreNeverTurnedRoundNorNoNumbers) {
+  std::mt19937 random(11);
+  std::uniform_real_distribution<double> unit(-1, 1);
+  const auto any = [&] { return glm::dvec3(unit(random), unit(random), unit(random)); };
+  constexpr float shortest = 256 * 0x1p-16f;
+  int64_t taken = 0, all = 0;
+  for (int i = 0; i < 20000; ++i) {
+    const glm::dvec3 slope = any() * std::exp2(6 * unit(random)), ahead = glm::normalize(any() + 1e-3);
+    const glm::dvec3 right = glm::normalize(glm::cross(ahead, any() + 2e-3)), down = glm::cross(ahead, right);
+    // Narrow fields of view; directions that nearly lie in a plane, or in a line; rays that are not there.
+    const double width = std::exp2(-1 - i % 20), tilt = std::exp2(-(i / 20 % 16));
+    const glm::dvec3 ways[3][3] = {{right * width, down * width, ahead * 0.5},
+                                   {right, glm::mix(right, down, tilt), ahead},
+                                   {right, down, glm::mix(right + down, ahead, tilt)}};
+    const auto& way = ways[i % 3];
+    const unsigned inside = i % 5 == 0 ? static_cast<unsigned>(random()) : ~0u;
+    Packet packet = packet_of(slope, glm::dvec3(200) + any() * 40.0, way[0], way[1], way[2], inside);
+    const DvrSamples<PortableLanes> before = packet.first;
+    use_neighbours<PortableLanes>(shortest, packet.first, packet.second);
+    for (int lane = 0; lane < 8; ++lane) {
+      const auto& g = packet.first.here.gradient;
+      const glm::dvec3 got(g.x[lane], g.y[lane], g.z[lane]);
+      ASSERT_TRUE(std::isfinite(got.x) && std::isfinite(got.y) && std::isfinite(got.z)) << i;
+      ASSERT_GT(glm::dot(got, slope), 0) << i;
+      ++all;
+      taken += g.x[lane] != before.here.gradient.x[lane];
+      // What is not there, and what is too near, says nothing.
+      const unsigned needed = 1u << lane | 1u << (lane ^ 1) | 1u << (lane ^ 4) | 256u << lane;
+      if ((inside & needed) != needed || (i % 3 == 0 && width < static_cast<double>(shortest) / 2)) {
+        ASSERT_EQ(g.x[lane], before.here.gradient.x[lane]) << i;
+      }
+    }
+  }
+  EXPECT_GT(taken * 4, all);  // many are determined
 }
 
 TEST(DvrGradient, LightIsNeverNegativeNorNoNumber) {

@@ -329,6 +329,18 @@ TEST(Dvr, BricksOfWhichNothingIsSeenAreNotDecoded) {
   }
 }
 
+TEST(Dvr, NarrowFieldsOfViewHaveTheGradientsOfCells) {
+  // Rays a few millionths of a voxel apart: the rounding of their places would be all there is to see.
+  auto source = open_builtin("sphere:64");
+  const DvrScene scene = scene_of(dense(**source), ramp(20, 255));
+  Camera camera = Camera::orbit(33, 21, 1.7, 1e-4);
+  DvrOptions options = small();
+  const DvrFrame expected = draw(scene, camera, options);
+  EXPECT_EQ(expected.rays_hit, 75u * 53);
+  options.gradient = Gradient::neighbour;
+  expect_same(draw(scene, camera, options), expected);
+}
+
 TEST(Dvr, ColoursAndTooManySamplesAreRefused) {
   Context ctx = context();
   auto source = open_builtin("menger:1");
