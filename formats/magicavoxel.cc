@@ -19,7 +19,8 @@ using Place = std::array<int32_t, 3>;
 using Color = std::array<uint8_t, 3>;
 
 constexpr int32_t furthest = 1 << 20;
-constexpr int deepest = 64;  // nodes below each other
+constexpr int deepest = 64;                // nodes below each other
+constexpr uint64_t most_visits = 1 << 20;  // of nodes, each as often as it is placed
 
 uint32_t tag(const char (&letters)[5]) {
   uint32_t value;
@@ -259,7 +260,8 @@ class File {
     if (found == nodes_.end()) return bad_input(name_, fmt::format("node {}: not there", id));
     if (depth > deepest)
       return bad_input(name_, fmt::format("node {}: more than {} nodes deep", id, deepest));
-    VOX_CHECK(check_interrupt());
+    if (++visited_ > most_visits)
+      return bad_input(name_, fmt::format("more than {} nodes to place", most_visits));
     const Node& node = found->second;
     if (const auto layer = hidden_layers_.find(node.layer);
         node.hidden || (node.kind == Kind::transform && layer != hidden_layers_.end() && layer->second))
@@ -317,7 +319,7 @@ class File {
   std::array<Color, 256> palette_ = default_palette();
   std::map<uint32_t, Node> nodes_;
   std::map<uint32_t, bool> hidden_layers_;
-  uint64_t placed_ = 0;
+  uint64_t placed_ = 0, visited_ = 0;
   VoxelScene scene_;
 };
 

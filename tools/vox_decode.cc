@@ -4,6 +4,9 @@
 #include "formats/convert.h"
 #include "formats/copy.h"
 #include "formats/open_volume.h"
+#include "formats/ply_points.h"
+#include "formats/readers.h"
+#include "libcolor/morton.h"
 #include "tools/common/input.h"
 #include "tools/common/json.h"
 #include "tools/common/main.h"
@@ -22,7 +25,9 @@ struct Options {
 
 void declare(CommandLine& line, Options& o) {
   line.argument("FILE", "Compressed volume (.svmm, .vqv, .dagc), or -", o.input);
-  line.text("-o,--output", "OUT", "Volume file, pattern such as slice-%04d.tif, or -", o.output, true);
+  line.text("-o,--output", "OUT",
+            "Volume file, pattern such as slice-%04d.tif, or -; of a .dagc file also points (.ply)", o.output,
+            true);
   line.option("--roi", "BOX", "X0,Y0,Z0,X1,Y1,Z1: part of the volume, half open, in voxels of level 0",
               box(o.roi));
   line.option("--level", "N", "Stop at this mip level; 0: all detail", integer(o.level, 0, 64));
@@ -31,12 +36,58 @@ void declare(CommandLine& line, Options& o) {
                        "Values that a narrower type's ends stand for (default: least and greatest value)");
 }
 
+/// The voxels of a surface as points where their centres are.
+Result<int> write_points(const Options& o, const color::Volume& volume, Run& run) {
+  const VolumeInfo& info = volume.info();
+  VOX_TRY(auto writer, PlyPointWriter::create(o.output, volume.params().leaf_voxels, run.options.force));
+  run.stage("decode");
+  const double start = run.seconds();
+  std::vector<ColoredPoint> points;
+  VOX_CHECK(volume.for_each_voxel(
+      [&](std::span<const color::SurfaceVoxel> voxels) -> Status {
+        points.clear();
+        for (const color::SurfaceVoxel& voxel : voxels) {
+          const auto at = color::morton_place(voxel.place);
+          ColoredPoint& point = points.emplace_back();
+          for (size_t a = 0; a < 3; ++a)
+            point.at[a] = static_cast<float>(info.origin[a] + info.spacing[a] * at[static_cast<int>(a)]);
+          point.color = {voxel.color.r, voxel.color.g, voxel.color.b};
+        }
+        return writer.add(points);
+      },
+      run.ctx));
+  VOX_CHECK(writer.finish());
+  const double seconds = run.seconds() - start;
+  run.note(fmt::format("{}: {} points in {:.2f} s", o.output, volume.params().leaf_voxels, seconds));
+  if (run.options.json) {
+    Json json = Json::result();
+    json.set("tool", run.tool).set("version", version_text()).set("input", o.input).set("output", o.output);
+    json.set("dims", info.dims)
+        .set("voxel_format", name(info.format))
+        .set("leaf_voxels", volume.params().leaf_voxels);
+    json.set("decode_seconds", seconds)
+        .set("peak_rss_bytes", peak_rss_bytes())
+        .set("threads", run.options.threads);
+    VOX_CHECK(print(json.text()));
+  }
+  return 0;
+}
+
 Result<int> work(const Options& o, Run& run) {
   if (run.options.json && o.output == "-")
     return bad_usage("--json and the output - both use standard output");
   VOX_CHECK(check_distinct(o.input, o.output));
-  VOX_CHECK(check_volume_output(o.output, run.options.force));
+  const bool points = has_ending(o.output, ".ply");
+  if (points && (o.roi || o.type))
+    return bad_usage("--roi, --type: not of points: leave them out, or name a volume");
+  VOX_CHECK(points ? check_output(o.output, run.options.force)
+                   : check_volume_output(o.output, run.options.force));
   VOX_TRY(Input input, open_compressed(o.input, o.level, run.ctx));
+  if (points) {
+    if (!input.color)
+      return fail(ErrorCode::usage, o.input, "points are made of surfaces: expected a .dagc file");
+    return write_points(o, *input.color, run);
+  }
   auto source = std::move(input.source);
   if (o.roi) {
     const VolumeInfo whole = input.svmm ? input.svmm->info() : source->info();
@@ -84,6 +135,7 @@ int main(int argc, char** argv) {
       "  vox-decode head.svmm -o head.nrrd\n"
       "  vox-decode head.vqv -o part.nii.gz --roi 0,0,0,64,64,64\n"
       "  vox-decode head.svmm -o small.nrrd --level 2\n"
+      "  vox-decode house.dagc -o house.ply\n"
       "  vox-decode head.svmm -o slice-%04d.png --type u8\n",
       [&](CommandLine& line) { declare(line, options); }, [&](Run& run) { return work(options, run); });
 }
