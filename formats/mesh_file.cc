@@ -1,4 +1,5 @@
 // Meshes by assimp: .obj, .gltf and .glb files.
+#include <assimp/BaseImporter.h>
 #include <assimp/GltfMaterial.h>
 #include <assimp/config.h>
 #include <assimp/importerdesc.h>
@@ -270,7 +271,9 @@ void keep_readers(Assimp::Importer& importer) {
   for (size_t i = importer.GetImporterCount(); i-- > 0;) {
     const aiImporterDesc* about = importer.GetImporterInfo(i);
     const std::string_view endings = about && about->mFileExtensions ? about->mFileExtensions : "";
-    if (endings != "obj" && endings != "gltf glb") importer.UnregisterLoader(importer.GetImporter(i));
+    if (endings == "obj" || endings == "gltf glb") continue;
+    const std::unique_ptr<Assimp::BaseImporter> reader(importer.GetImporter(i));  // ours from here on
+    importer.UnregisterLoader(reader.get());
   }
 }
 
