@@ -3,9 +3,9 @@
 
 #include <cstddef>
 #include <span>
-#include <vector>
 
 #include "libcolor/block_layout.h"
+#include "libcolor/encoded_part.h"
 
 namespace voxkit::color {
 
@@ -18,13 +18,6 @@ struct BlockOptions {
 
 /// Endpoints with which any colour can be coded within a threshold: 5 and 6 bits are off by up to 6.1.
 Endpoints endpoints_for(double threshold);
-
-struct EncodedPart {
-  std::vector<std::byte> bytes;
-  uint64_t blocks = 0;
-  uint64_t squared_error = 0;  ///< sum of squared RGB distances of decoded colours
-  uint32_t most_squared = 0;   ///< the greatest
-};
 
 /// Encodes 1 to 2^20 colours as a part.
 EncodedPart encode_part(std::span<const Rgb> colors, const BlockOptions& options);

@@ -31,7 +31,7 @@ class Checker {
     }));
     VOX_CHECK(check_dag());
     const auto parts = static_cast<int64_t>(part_count(params_.color_count));
-    if (params_.codec == ColorCodec::raw) return {};
+    if (!has_threshold(params_.codec)) return {};  // any bytes are valid there
     return parallel_for(ctx_, parts, [&](int64_t part) { return check_part(static_cast<uint64_t>(part)); });
   }
 

@@ -12,6 +12,7 @@
 #include "formats/source.h"
 #include "libcolor/block_layout.h"
 #include "libcolor/dag.h"
+#include "libcolor/image_curve.h"
 #include "libcolor/surface.h"
 
 namespace voxkit::color {
@@ -23,14 +24,27 @@ enum class ColorCodec : uint8_t {
   raw = 1,  ///< 24 bits each
   fws = 2,  ///< variable bitrate blocks, weights of fixed size (section 4.2)
   vws = 3,  ///< the same, weights of variable size (section 4.3)
+  bc1 = 4,  ///< an image of them, in blocks of 16 (section 4.1): 4 bits each
 };
+
+/// Whether a codec keeps within a threshold.
+constexpr bool has_threshold(ColorCodec codec) {
+  return codec == ColorCodec::fws || codec == ColorCodec::vws;
+}
+
+/// Whether a codec lays colours into images, in blocks of textures.
+constexpr bool makes_textures(ColorCodec codec) {
+  return codec == ColorCodec::bc1;
+}
 
 /// What an encoder is asked for.
 struct Options {
   ColorCodec codec = ColorCodec::vws;
   double threshold = 9.56;  ///< of fws and vws: greatest distance of a decoded colour, in RGB of 0 to 255
   int weight_bits = 3;      ///< of fws: 1 to 4
-  int effort = 3;           ///< of fws and vws: 1: the paper's greedy merging; up to 9: smaller, slower
+  int effort = 3;           ///< of fws and vws: 1: the paper's greedy merging; up to 9: smaller, slower; of
+                            ///< textures: up to 9: nearer, slower
+  ImageCurve image_curve = ImageCurve::morton;  ///< of textures
   Colors colors = Colors::leaf;
   Counts counts = Counts::node;
 };
@@ -41,7 +55,8 @@ struct Params {
   Colors colors = Colors::leaf;
   Counts counts = Counts::node;
   Endpoints endpoints = Endpoints::rgb565;
-  int height = leaf_height;  ///< the grid is 2^height voxels a side
+  ImageCurve image_curve = ImageCurve::morton;  ///< of textures
+  int height = leaf_height;                     ///< the grid is 2^height voxels a side
   uint32_t root = 0;
   uint64_t leaf_voxels = 0, color_count = 0;
   // For the reader's information.

@@ -10,6 +10,7 @@
 #include "libcolor/dag_builder.h"
 #include "libcolor/layout.h"
 #include "libcolor/node_colors.h"
+#include "libcolor/texture.h"
 
 namespace voxkit::color {
 namespace {
@@ -67,6 +68,7 @@ class ColorWriter {
     return {};
   }
   EncodedPart encode(std::span<const Rgb> colors) const {
+    if (makes_textures(options_.codec)) return encode_texture(colors, options_);
     if (options_.codec != ColorCodec::raw)
       return encode_part(colors,
                          {options_.threshold, options_.codec == ColorCodec::fws ? options_.weight_bits : 0,
@@ -148,7 +150,8 @@ Result<Report> encode(SurfaceSource& source, const Options& options, const ByteS
   p.dag_nodes = dag.node_count;
   p.color_bytes = colors.bytes;
   p.blocks = colors.blocks;
-  if (options.codec != ColorCodec::raw) {
+  p.image_curve = options.image_curve;
+  if (has_threshold(options.codec)) {
     p.endpoints = endpoints_for(options.threshold);
     p.threshold = options.threshold;
     p.weight_bits = options.codec == ColorCodec::fws ? options.weight_bits : 0;

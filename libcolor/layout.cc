@@ -27,6 +27,7 @@ std::vector<std::byte> pack_params(const Params& p) {
   bytes[4] = static_cast<std::byte>(p.height);
   bytes[5] = static_cast<std::byte>(p.weight_bits);
   bytes[6] = std::byte{morton_curve};
+  if (makes_textures(p.codec)) bytes[7] = static_cast<std::byte>(p.image_curve);
   store_le(&bytes[8], p.leaf_voxels);
   store_le(&bytes[16], p.color_count);
   store_le(&bytes[24], p.root);
@@ -55,7 +56,7 @@ Result<Params> unpack_params(std::span<const std::byte> bytes, const VolumeInfo&
     if (field(at) >= 1 && field(at) <= most) return {};
     return bad(at, fmt::format("unknown {} {}", what, field(at)));
   };
-  VOX_CHECK(is_one_of(0, 3, "color codec"));
+  VOX_CHECK(is_one_of(0, 4, "color codec"));
   VOX_CHECK(is_one_of(1, 2, "choice of colors"));
   VOX_CHECK(is_one_of(2, 2, "place of counts"));
   VOX_CHECK(is_one_of(3, 2, "kind of endpoints"));
@@ -65,6 +66,10 @@ Result<Params> unpack_params(std::span<const std::byte> bytes, const VolumeInfo&
   p.colors = static_cast<Colors>(field(1));
   p.counts = static_cast<Counts>(field(2));
   p.endpoints = static_cast<Endpoints>(field(3));
+  if (makes_textures(p.codec)) {
+    VOX_CHECK(is_one_of(7, 2, "curve of images"));
+    p.image_curve = static_cast<ImageCurve>(field(7));
+  }
   p.height = field(4);
   p.weight_bits = field(5);
   p.leaf_voxels = number(8);

@@ -54,9 +54,12 @@ Status Store::find_chunks(const Container& container, const Params& params) {
     if (parts_[part] == none) return bad(fmt::format("no chunk COLR 0.{}", part));
     const uint64_t length = table[parts_[part]].length;
     const uint32_t colors = colors_of_part(params.color_count, part);
-    if (params.codec == ColorCodec::raw && length != uint64_t{colors} * 3)
-      return bad(
-          fmt::format("chunk COLR 0.{} has {} bytes: expected {}", part, length, uint64_t{colors} * 3));
+    if (!has_threshold(params.codec)) {
+      const uint64_t expected =
+          params.codec == ColorCodec::raw ? uint64_t{colors} * 3 : texture_bytes(params, colors);
+      if (length != expected)
+        return bad(fmt::format("chunk COLR 0.{} has {} bytes: expected {}", part, length, expected));
+    }
     sizes_.push_back(length);
   }
   found_ = std::make_unique<std::atomic<const std::byte*>[]>(parts);
@@ -107,7 +110,8 @@ bool ColorReader::open(uint64_t part) {
   first_ = last_ = 0;
   part_ = bytes_ != nullptr ? part : ~uint64_t{0};
   if (bytes_ == nullptr) return false;
-  if (params_.codec != ColorCodec::raw)
+  if (makes_textures(params_.codec)) texture_.open(bytes_, params_);
+  if (has_threshold(params_.codec))
     view_ = PartView(bytes_, store_.part_bytes(part), colors_of_part(params_.color_count, part),
                      params_.endpoints);
   return true;

@@ -8,6 +8,7 @@
 
 #include "libcolor/dag_view.h"
 #include "libcolor/layout.h"
+#include "libcolor/texture.h"
 
 namespace voxkit::color {
 
@@ -56,12 +57,13 @@ class ColorReader {
       const std::byte* const p = bytes_ + uint64_t{within} * 3;
       return {static_cast<uint8_t>(p[0]), static_cast<uint8_t>(p[1]), static_cast<uint8_t>(p[2])};
     }
+    if (makes_textures(params_.codec)) return texture_.color(within);
     if (within < first_ || within >= last_) find(within);
     if (first_ == last_) return view_.color(within);
     return view_.color_in(macro_, block_, within % macro_block_colors);
   }
   /// Blocks that have been looked up, for those who count.
-  uint64_t blocks_touched() const { return touched_; }
+  uint64_t blocks_touched() const { return touched_ + texture_.blocks(); }
 
  private:
   bool open(uint64_t part);
@@ -72,6 +74,7 @@ class ColorReader {
   const Params& params_;
   uint64_t part_ = ~uint64_t{0};
   const std::byte* bytes_ = nullptr;
+  TextureReader texture_;
   PartView view_;
   PartView::MacroBlock macro_;
   PartView::Block block_;

@@ -15,7 +15,7 @@ namespace {
 struct Options {
   std::string input, output;
   SurfaceOptions surface;
-  std::string kind = "thin", codec = "vws", colors = "leaf", counts = "node";
+  std::string kind = "thin", codec = "vws", image_curve = "morton", colors = "leaf", counts = "node";
   color::Options encoder;
   bool verify = false;
 };
@@ -31,23 +31,33 @@ void declare(CommandLine& line, Options& o) {
   line.option("--surface", "KIND",
               "Of a mesh: thin: no more voxels than make it tight; conservative: all that it touches (thin)",
               one_of(o.kind, {"thin", "conservative"}));
-  line.option("--codec", "CODEC",
-              "raw: 24 bits a colour; fws, vws: blocks with weights of fixed and of variable size (vws)",
-              one_of(o.codec, {"raw", "fws", "vws"}));
+  line.option(
+      "--codec", "CODEC",
+      "raw: 24 bits a colour; fws, vws: blocks with weights of fixed and of variable size; bc1: images, "
+      "as textures, 4 bits a colour (vws)",
+      one_of(o.codec, {"raw", "fws", "vws", "bc1"}));
   line.option("-e,--threshold", "E",
               "Of blocks: no colour is further from the original, in RGB of 0 to 255 (9.56)",
               number(o.encoder.threshold, 0, 1e6));
   line.option("--weight-bits", "B", "Of fws: bits of a weight, 1 to 4 (3)",
               integer(o.encoder.weight_bits, 1, color::most_weight_bits));
-  line.option("--effort", "N",
-              "Of blocks: 1: greedy merging, as published; up to 9: smaller files, slower (3)",
-              integer(o.encoder.effort, 1, 9));
+  line.option(
+      "--effort", "N",
+      "Of blocks: 1: greedy merging, as published; up to 9: smaller files, slower; of textures: up to 9: "
+      "nearer, slower (3)",
+      integer(o.encoder.effort, 1, 9));
+  line.option("--image-curve", "CURVE",
+              "Of textures: colours are laid along a curve: morton or hilbert (morton)",
+              one_of(o.image_curve, {"morton", "hilbert"}));
   line.option("--colors", "WHICH", "leaf: those of voxels; all: of all nodes, too (leaf)",
               one_of(o.colors, {"leaf", "all"}));
   line.option("--counts", "WHERE", "node: counts in nodes; pointer: beside pointers, larger, faster (node)",
               one_of(o.counts, {"node", "pointer"}));
-  line.flag("--verify",
-            "Decode and compare before the output appears; exit 1 if the promised bound is broken", o.verify);
+  line.flag(
+      "--verify",
+      "Decode and compare before the output appears; exit 1 if the promised bound, or what encoding found "
+      "out, is broken",
+      o.verify);
   declare_input_options(line, o.surface.open);
 }
 
@@ -55,7 +65,9 @@ color::Options encoder_options(const Options& o) {
   color::Options options = o.encoder;
   options.codec = o.codec == "raw"   ? color::ColorCodec::raw
                   : o.codec == "fws" ? color::ColorCodec::fws
+                  : o.codec == "bc1" ? color::ColorCodec::bc1
                                      : color::ColorCodec::vws;
+  options.image_curve = o.image_curve == "hilbert" ? color::ImageCurve::hilbert : color::ImageCurve::morton;
   options.colors = o.colors == "all" ? color::Colors::all : color::Colors::leaf;
   options.counts = o.counts == "pointer" ? color::Counts::pointer : color::Counts::node;
   return options;
@@ -106,7 +118,7 @@ Result<int> work(const Options& o, Run& run) {
     VOX_TRY(source, open_surface(o.input, surface, run.ctx));
     VOX_TRY(const Input decoded, open_compressed(out->temporary(), 0, run.ctx));
     VOX_TRY(diff, color::compare(*source, *decoded.color, run.ctx));
-    const double bound = p.codec == color::ColorCodec::raw ? 0 : p.threshold;
+    const double bound = color::has_threshold(p.codec) ? p.threshold : report.most_error;
     if (!diff->same_voxels || diff->max_distance > bound) {
       cli::report(run.tool,
                   {ErrorCode::internal, o.output,
@@ -138,6 +150,7 @@ int main(int argc, char** argv) {
       "  dagcolor-pack menger:5 -o sponge.dagc\n"
       "  dagcolor-pack house.glb -o house.dagc --resolution 4096\n"
       "  dagcolor-pack model.nrrd -o model.dagc --threshold 6.38 --verify\n"
-      "  dagcolor-pack model.nrrd -o model.dagc --codec raw\n",
+      "  dagcolor-pack model.nrrd -o model.dagc --codec raw\n"
+      "  dagcolor-pack house.glb -o house.dagc --codec bc1 --image-curve hilbert\n",
       [&](CommandLine& line) { declare(line, options); }, [&](Run& run) { return work(options, run); });
 }

@@ -70,7 +70,7 @@ Voxels inside(const Voxels& voxels, Index3 dims) {
 
 TEST(ColorVolume, EveryVoxelComesBack) {
   for (const auto& [all, dims] : scenes())
-    for (const ColorCodec codec : {ColorCodec::raw, ColorCodec::fws, ColorCodec::vws})
+    for (const ColorCodec codec : {ColorCodec::raw, ColorCodec::fws, ColorCodec::vws, ColorCodec::bc1})
       for (const auto& [counts, colors] : {std::pair(Counts::node, Colors::leaf),
                                            {Counts::pointer, Colors::leaf},
                                            {Counts::node, Colors::all},
@@ -81,9 +81,13 @@ TEST(ColorVolume, EveryVoxelComesBack) {
         options.codec = codec;
         options.counts = counts;
         options.colors = colors;
-        const double bound = codec == ColorCodec::raw ? 0 : options.threshold;
+        if (counts == Counts::pointer) options.image_curve = ImageCurve::hilbert;
         ListSource source(voxels, dims);
         const Encoded file = encoded(source, options);
+        const double bound = has_threshold(codec) ? options.threshold : file.report.most_error;
+        if (codec == ColorCodec::raw) {
+          EXPECT_EQ(bound, 0);
+        }
         EXPECT_EQ(file.report.params.leaf_voxels, voxels.size());
         const auto volume = opened(file.bytes);
         ASSERT_TRUE(volume) << volume.error().what;
@@ -213,6 +217,25 @@ TEST(ColorVolume, ManyParts) {
     const auto color = (*volume)->color(i);
     ASSERT_TRUE(color);
     EXPECT_LE(distance(*color, voxels[i].color), 9.56);
+  }
+}
+
+/// Parts of textures, and how large they are.
+TEST(ColorVolume, TexturesTakeAsManyBitsAsTheyMust) {
+  const Voxels voxels =
+      voxels_where(7, [](uint32_t x, uint32_t y, uint32_t z) { return (x + y + z) % 3 != 0; });
+  Options options;
+  options.codec = ColorCodec::bc1;
+  options.image_curve = ImageCurve::hilbert;
+  ListSource source(voxels, Index3(128));
+  const Encoded file = encoded(source, options, 2);
+  EXPECT_EQ(file.report.params.color_bytes, (voxels.size() + 15) / 16 * 8);
+  const auto volume = opened(file.bytes);
+  ASSERT_TRUE(volume);
+  for (size_t i = 0; i < voxels.size(); i += 1001) {
+    const auto color = (*volume)->color(i);
+    ASSERT_TRUE(color);
+    EXPECT_LE(distance(*color, voxels[i].color), file.report.most_error);
   }
 }
 

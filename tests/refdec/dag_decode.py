@@ -16,7 +16,7 @@ import sys
 from container import Container, Refused, Volume, require
 
 SURFACE = 3
-CODECS = {1: "raw", 2: "fws", 3: "vws"}
+CODECS = {1: "raw", 2: "fws", 3: "vws", 4: "bc1"}
 VOXELS, ALL = 1, 2
 IN_NODES, BESIDE = 1, 2
 WIDE = (1 << 24) - 1
@@ -40,13 +40,14 @@ class Surface:
     def read_parameters(self, chunk):
         at = chunk.offset
         require(chunk.length == 128, "chunk DAGP: byte {}: {} bytes, expected 128", at, chunk.length)
-        (self.codec, self.has_color, self.counts, self.endpoints, self.height, _, curve, self.voxels, self.count,
-         self.root, self.threshold, self.error) = self.container.unpack("<7BxQQI4xdd", at)
+        (self.codec, self.has_color, self.counts, self.endpoints, self.height, _, curve, self.image_curve, self.voxels, self.count,
+         self.root, self.threshold, self.error) = self.container.unpack("<8BQQI4xdd", at)
         require(self.codec in CODECS, "chunk DAGP: byte 0: {}", self.codec)
         require(self.has_color in (VOXELS, ALL), "chunk DAGP: byte 1: {}", self.has_color)
         require(self.counts in (IN_NODES, BESIDE), "chunk DAGP: byte 2: {}", self.counts)
         require(self.endpoints in (1, 2), "chunk DAGP: byte 3: {}", self.endpoints)
         require(curve == 1, "chunk DAGP: byte 6: {}", curve)
+        require(CODECS[self.codec] != "bc1" or self.image_curve in (1, 2), "chunk DAGP: byte 7: {}", self.image_curve)
         height = 2
         while 1 << height < max(self.volume.dims):
             height += 1
@@ -119,12 +120,38 @@ class Surface:
         for chunk in chunks:
             data = self.container.data[chunk.offset:chunk.offset + chunk.length]
             n = min(PART, self.count - PART * chunk.part)
-            self.colors += self.raw(data, n) if self.codec == 1 else self.part(data, n)
+            read = {"raw": self.raw, "bc1": self.bc1}.get(CODECS[self.codec], self.part)
+            self.colors += read(data, n)
 
     @staticmethod
     def raw(data, n):
         require(len(data) == 3 * n, "chunk COLR: {} bytes of {} colours", len(data), n)
         return [tuple(data[3 * i:3 * i + 3]) for i in range(n)]
+
+    # Section 4.6
+    def pixel(self, i):
+        x = y = 0
+        for k in range(10):
+            q, s = i >> 2 * k & 3, 1 << k
+            if self.image_curve == 1:
+                x, y = x + s * (q & 1), y + s * (q >> 1)
+            else:
+                x, y = ((y, x), (x, y + s), (x + s, y + s), (2 * s - 1 - y, s - 1 - x))[q]
+        return x, y
+
+    def bc1(self, data, n):
+        require(len(data) == 8 * -(-n // 16), "chunk COLR: {} bytes of {} colours", len(data), n)
+        colors = []
+        for i in range(n):
+            if i % 16 == 0:
+                c0, c1, values = struct.unpack_from("<HHI", data, i // 2)
+                a, b = ((8 * (c >> 11) + (c >> 11) // 4, 4 * (c >> 5 & 63) + (c >> 5 & 63) // 16, 8 * (c & 31) + (c & 31) // 4)
+                        for c in (c0, c1))
+                mixed = lambda u, v: tuple((u * p + v * q) // (u + v) for p, q in zip(a, b))
+                steps = [a, b] + ([mixed(2, 1), mixed(1, 2)] if c0 > c1 else [mixed(1, 1), (0, 0, 0)])
+            x, y = self.pixel(i)
+            colors.append(steps[values >> 2 * (x % 4 + 4 * (y % 4)) & 3])
+        return colors
 
     def part(self, data, n):
         h, m = (8 if self.endpoints == 1 else 10), -(-n // MACRO)

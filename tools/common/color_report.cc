@@ -7,18 +7,23 @@
 namespace voxkit::cli {
 
 std::string_view name(color::ColorCodec codec) {
-  constexpr std::string_view names[] = {"", "raw", "fws", "vws"};
+  constexpr std::string_view names[] = {"", "raw", "fws", "vws", "bc1"};
   return names[static_cast<size_t>(codec)];
+}
+
+std::string_view name(color::ImageCurve curve) {
+  return curve == color::ImageCurve::morton ? "morton" : "hilbert";
 }
 
 Json params_json(const color::Params& p) {
   Json json = Json::object();
   json.set("codec", name(p.codec));
-  if (p.codec != color::ColorCodec::raw) {
+  if (color::has_threshold(p.codec)) {
     json.set("threshold", p.threshold);
     json.set("endpoints", p.endpoints == color::Endpoints::rgb565 ? "565" : "888");
   }
   if (p.codec == color::ColorCodec::fws) json.set("weight_bits", p.weight_bits);
+  if (color::makes_textures(p.codec)) json.set("image_curve", name(p.image_curve));
   json.set("colors", p.colors == color::Colors::leaf ? "leaf" : "all");
   json.set("counts", p.counts == color::Counts::node ? "node" : "pointer");
   return json;
@@ -44,7 +49,9 @@ std::string sizes_text(const color::Params& p) {
                       name(p.codec), p.color_count,
                       p.colors == color::Colors::leaf ? "voxels" : "voxels and nodes", p.color_bytes,
                       color_percent(p), p.grmse);
-  if (p.codec != color::ColorCodec::raw)
+  if (color::makes_textures(p.codec))
+    text += fmt::format("images      {} blocks, along a {} curve\n", p.blocks, name(p.image_curve));
+  if (color::has_threshold(p.codec))
     text += fmt::format("blocks      {} in {} macro blocks, threshold {:.6g}\n", p.blocks, p.macro_blocks,
                         p.threshold);
   return text;

@@ -10,6 +10,7 @@
 namespace voxkit::cli {
 
 std::string_view name(color::ColorCodec codec);
+std::string_view name(color::ImageCurve curve);
 Json params_json(const color::Params& params);
 /// Sizes: leaf_voxels, dag_nodes, dag_bytes, color_count, color_bytes, macro_blocks, blocks.
 void add_sizes(const color::Params& params, Json& json);

@@ -1,0 +1,212 @@
+// Colours as textures: curves, blocks of 16, and what encoding says about them.
+#include <gtest/gtest.h>
+
+#include <cmath>
+#include <set>
+
+#include "libcolor/bc1.h"
+#include "libcolor/texture.h"
+#include "tests/libcolor/color_runs.h"
+
+namespace voxkit::color {
+namespace {
+
+constexpr ImageCurve curves[] = {ImageCurve::morton, ImageCurve::hilbert};
+
+Params params_of(const Options& options) {
+  Params params;
+  params.codec = options.codec;
+  params.image_curve = options.image_curve;
+  return params;
+}
+
+TEST(ImageCurve, ComesToEveryPixelOnce) {
+  for (const ImageCurve curve : curves) {
+    std::vector<bool> seen(part_colors);
+    for (uint32_t i = 0; i < part_colors; ++i) {
+      const Pixel at = curve_pixel(curve, i);
+      ASSERT_LT(at.x, image_side);
+      ASSERT_LT(at.y, image_side);
+      ASSERT_FALSE(seen[at.y * image_side + at.x]);
+      seen[at.y * image_side + at.x] = true;
+    }
+  }
+}
+
+TEST(ImageCurve, SixteenInARowAreASquare) {
+  for (const ImageCurve curve : curves)
+    for (uint32_t i = 0; i < part_colors; i += 16) {
+      const Pixel first = curve_pixel(curve, i);
+      for (uint32_t j = 1; j < 16; ++j) {
+        const Pixel at = curve_pixel(curve, i + j);
+        ASSERT_EQ(at.x / 4, first.x / 4);
+        ASSERT_EQ(at.y / 4, first.y / 4);
+      }
+    }
+}
+
+TEST(ImageCurve, OfHilbertGoesFromNeighbourToNeighbour) {
+  Pixel last = curve_pixel(ImageCurve::hilbert, 0);
+  EXPECT_EQ(last, Pixel{});
+  for (uint32_t i = 1; i < part_colors; ++i) {
+    const Pixel at = curve_pixel(ImageCurve::hilbert, i);
+    const int dx = static_cast<int>(at.x) - static_cast<int>(last.x),
+              dy = static_cast<int>(at.y) - static_cast<int>(last.y);
+    ASSERT_EQ(dx * dx + dy * dy, 1) << i;
+    last = at;
+  }
+}
+
+Pixels16 decoded(const std::array<std::byte, bc1_block_bytes>& block) {
+  Pixels16 pixels;
+  decode_bc1(block.data(), pixels);
+  return pixels;
+}
+std::array<std::byte, bc1_block_bytes> bc1_of(uint16_t c0, uint16_t c1, uint32_t indices) {
+  std::array<std::byte, bc1_block_bytes> block{};
+  store_le(block.data(), c0);
+  store_le(block.data() + 2, c1);
+  store_le(block.data() + 4, indices);
+  return block;
+}
+
+/// Computed by hand.
+TEST(Bc1, BlocksAreRead) {
+  const auto four = decoded(bc1_of(0xf800, 0x001f, 0b11100100));
+  EXPECT_EQ(four[0], (Rgb{255, 0, 0}));
+  EXPECT_EQ(four[1], (Rgb{0, 0, 255}));
+  EXPECT_EQ(four[2], (Rgb{170, 0, 85}));
+  EXPECT_EQ(four[3], (Rgb{85, 0, 170}));
+  EXPECT_EQ(four[15], (Rgb{255, 0, 0}));
+  const auto three = decoded(bc1_of(0x001f, 0xf800, 0b11100100));
+  EXPECT_EQ(three[0], (Rgb{0, 0, 255}));
+  EXPECT_EQ(three[1], (Rgb{255, 0, 0}));
+  EXPECT_EQ(three[2], (Rgb{127, 0, 127}));
+  EXPECT_EQ(three[3], Rgb{});
+}
+
+uint64_t error_of(const Pixels16& pixels, const Pixels16& others) {
+  EncodedPart part;
+  for (size_t i = 0; i < 16; ++i) part.add_error(pixels[i], others[i]);
+  return part.squared_error;
+}
+
+uint64_t bc1_error(const Pixels16& pixels, int effort) {
+  std::array<std::byte, bc1_block_bytes> block;
+  encode_bc1(pixels, effort, block.data());
+  return error_of(pixels, decoded(block));
+}
+
+/// What can be said exactly comes back so.
+TEST(Bc1, ColorsThatABlockHasAreKept) {
+  std::mt19937 random(5);
+  for (int round = 0; round < 300; ++round) {
+    const auto a = static_cast<uint16_t>(random()), b = static_cast<uint16_t>(random());
+    // Of both ends only.
+    const Pixels16 pixels = decoded(bc1_of(a, b, static_cast<uint32_t>(random()) & 0x55555555));
+    EXPECT_EQ(bc1_error(pixels, 3), 0u) << a << ' ' << b;
+  }
+}
+
+/// One colour is off by no more than its nearest third between two of 5 or 6 bits.
+TEST(Bc1, PlainBlocksAreNear) {
+  for (int v = 0; v < 256; ++v) {
+    const auto x = static_cast<uint8_t>(v);
+    Pixels16 pixels;
+    pixels.fill({x, static_cast<uint8_t>(255 - v), static_cast<uint8_t>(v * 7)});
+    EXPECT_LE(bc1_error(pixels, 1), 16u * 3) << v;
+  }
+}
+
+/// The best of all pairs of ends in a grid, by trying: of greys, so that there are few.
+TEST(Bc1, IsCloseToTheBest) {
+  std::mt19937 random(6);
+  uint64_t found = 0, best = 0, quick = 0;
+  for (int round = 0; round < 60; ++round) {
+    Pixels16 pixels;
+    const int base = static_cast<int>(random() % 200);
+    for (Rgb& p : pixels) {
+      const auto v = static_cast<uint8_t>(base + static_cast<int>(random() % 56));
+      p = {v, v, v};
+    }
+    uint64_t least = ~uint64_t{0};
+    for (uint32_t a = 0; a < 32; ++a)
+      for (uint32_t b = 0; b < 32; ++b) {
+        const auto c0 = static_cast<uint16_t>(a << 11 | 2 * a << 5 | a),
+                   c1 = static_cast<uint16_t>(b << 11 | 2 * b << 5 | b);
+        const Pixels16 palette = decoded(bc1_of(c0, c1, 0b11100100));
+        uint64_t sum = 0;
+        for (const Rgb& p : pixels) {
+          uint64_t nearest = ~uint64_t{0};
+          for (size_t i = 0; i < 4; ++i) {
+            EncodedPart one;
+            one.add_error(p, palette[i]);
+            nearest = std::min(nearest, one.squared_error);
+          }
+          sum += nearest;
+        }
+        least = std::min(least, sum);
+      }
+    best += least;
+    found += bc1_error(pixels, 5);
+    quick += bc1_error(pixels, 1);
+  }
+  EXPECT_LE(found, quick);
+  EXPECT_LT(static_cast<double>(found), 1.02 * static_cast<double>(best));
+}
+
+class Textures : public testing::TestWithParam<ColorCodec> {};
+
+TEST_P(Textures, WhatIsReadIsWhatEncodingSaid) {
+  for (const ImageCurve curve : curves)
+    for (const size_t size : {size_t{1}, size_t{15}, size_t{16}, size_t{17}, size_t{3000}})
+      for (const ColorCase& c : color_cases(size, 4)) {
+        SCOPED_TRACE(testing::Message() << c.name << ", " << size);
+        Options options;
+        options.codec = GetParam();
+        options.image_curve = curve;
+        const EncodedPart part = encode_texture(c.colors, options);
+        const Params params = params_of(options);
+        ASSERT_EQ(part.bytes.size(), texture_bytes(params, static_cast<uint32_t>(size)));
+        TextureReader in_order, at_random;
+        in_order.open(part.bytes.data(), params);
+        at_random.open(part.bytes.data(), params);
+        EncodedPart seen;
+        std::vector<Rgb> colors;
+        for (uint32_t i = 0; i < size; ++i) {
+          colors.push_back(in_order.color(i));
+          seen.add_error(c.colors[i], colors.back());
+        }
+        EXPECT_EQ(seen.squared_error, part.squared_error);
+        EXPECT_EQ(seen.most_squared, part.most_squared);
+        std::mt19937 random(3);
+        for (int i = 0; i < 200; ++i) {
+          const auto index = static_cast<uint32_t>(random() % size);
+          ASSERT_EQ(at_random.color(index), colors[index]);
+        }
+      }
+}
+
+TEST_P(Textures, SmoothColorsStayNearAndEffortHelps) {
+  const auto cases = color_cases(4096, 9);
+  for (const ColorCase& c : cases) {
+    Options options;
+    options.codec = GetParam();
+    options.effort = 1;
+    const uint64_t quick = encode_texture(c.colors, options).squared_error;
+    options.effort = 6;
+    const uint64_t slow = encode_texture(c.colors, options).squared_error;
+    EXPECT_LE(slow, quick) << c.name;
+    if (c.name == "gradient") {
+      EXPECT_LT(std::sqrt(static_cast<double>(slow) / (3 * 4096)), 1.6);
+    }
+    if (c.name == "black") {
+      EXPECT_EQ(slow, 0u);
+    }
+  }
+}
+
+INSTANTIATE_TEST_SUITE_P(Codecs, Textures, testing::Values(ColorCodec::bc1));
+
+}  // namespace
+}  // namespace voxkit::color
