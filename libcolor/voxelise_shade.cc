@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <utility>
 
 #include "libcolor/linear_light.h"
 
@@ -34,20 +35,24 @@ struct Polygon {
 };
 
 /// The part of a polygon where sign * p[axis] <= limit.
-void clip(Polygon& polygon, size_t axis, double sign, double limit) {
-  Polygon out;
-  for (size_t i = 0; i < polygon.size; ++i) {
-    const Place& a = polygon.corners[i];
-    const Place& b = polygon.corners[i + 1 == polygon.size ? 0 : i + 1];
-    const double from = sign * a[axis] - limit, to = sign * b[axis] - limit;
-    if (from <= 0 && out.size < out.corners.size()) out.corners[out.size++] = a;
-    if ((from < 0) != (to < 0) && from != 0 && to != 0 && out.size < out.corners.size()) {
+void clip(const Polygon& in, size_t axis, double sign, double limit, Polygon& out) {
+  out.size = 0;
+  const Place* a = &in.corners[in.size - 1];
+  double from = sign * (*a)[axis] - limit;
+  for (size_t i = 0; i < in.size; ++i) {
+    const Place& b = in.corners[i];
+    const double to = sign * b[axis] - limit;
+    // Rounding may not make a polygon have more corners than it can have.
+    if ((from < 0 && to > 0) || (from > 0 && to < 0)) {
       const double part = from / (from - to);
-      out.corners[out.size++] = {a[0] + (b[0] - a[0]) * part, a[1] + (b[1] - a[1]) * part,
-                                 a[2] + (b[2] - a[2]) * part};
+      if (out.size < out.corners.size())
+        out.corners[out.size++] = {(*a)[0] + (b[0] - (*a)[0]) * part, (*a)[1] + (b[1] - (*a)[1]) * part,
+                                   (*a)[2] + (b[2] - (*a)[2]) * part};
     }
+    if (to <= 0 && out.size < out.corners.size()) out.corners[out.size++] = b;
+    a = &b;
+    from = to;
   }
-  polygon = out;
 }
 
 }  // namespace
@@ -138,23 +143,28 @@ Shade TriangleShade::at(int x, int y, int z) const {
 
 double TriangleShade::area_in(int x, int y, int z) const {
   const Place lo{static_cast<double>(x), static_cast<double>(y), static_cast<double>(z)};
-  Polygon polygon;
-  polygon.size = 3;
-  for (size_t i = 0; i < 3; ++i) polygon.corners[i] = minus(corners_[i], lo);
+  Polygon polygons[2];
+  Polygon *polygon = &polygons[0], *other = &polygons[1];
+  polygon->size = 3;
+  for (size_t i = 0; i < 3; ++i) polygon->corners[i] = minus(corners_[i], lo);
   for (size_t axis = 0; axis < 3; ++axis) {
     double least = 1, most = 0;
-    for (size_t i = 0; i < polygon.size; ++i) {
-      least = std::min(least, polygon.corners[i][axis]);
-      most = std::max(most, polygon.corners[i][axis]);
+    for (size_t i = 0; i < polygon->size; ++i) {
+      least = std::min(least, polygon->corners[i][axis]);
+      most = std::max(most, polygon->corners[i][axis]);
     }
-    if (least < 0) clip(polygon, axis, -1, 0);
-    if (most > 1) clip(polygon, axis, 1, 1);
-    if (polygon.size < 3) return 0;
+    const auto cut = [&](double sign, double limit) {
+      clip(*polygon, axis, sign, limit, *other);
+      std::swap(polygon, other);
+      return polygon->size >= 3;
+    };
+    if (least < 0 && !cut(-1, 0)) return 0;
+    if (most > 1 && !cut(1, 1)) return 0;
   }
+  const auto& corners = polygon->corners;
   Place sum{0, 0, 0};
-  for (size_t i = 2; i < polygon.size; ++i) {
-    const Place part = cross(minus(polygon.corners[i - 1], polygon.corners[0]),
-                             minus(polygon.corners[i], polygon.corners[0]));
+  for (size_t i = 2; i < polygon->size; ++i) {
+    const Place part = cross(minus(corners[i - 1], corners[0]), minus(corners[i], corners[0]));
     for (size_t c = 0; c < 3; ++c) sum[c] += part[c];
   }
   return std::sqrt(dot(sum, sum)) / 2;
