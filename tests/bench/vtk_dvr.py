@@ -137,7 +137,12 @@ class Peer:
         """Draws a frame as any program would, and keeps it if there is a path."""
         self.window.SetSize(width, height)
         self.look(angle)
-        self.window.Render()
+        for _ in range(5):  # a window may get its size late, and was drawn for another one then
+            self.window.Render()
+            if self.window.GetActualSize() == (width, height) and self.has_aspect(width, height):
+                break
+        else:
+            sys.exit(f"VTK's window is not {width} x {height} pixels")
         if path is None:
             return
         grab = vtkWindowToImageFilter()
@@ -148,9 +153,14 @@ class Peer:
         writer.SetFileName(str(path))
         writer.Write()
 
+    def has_aspect(self, width, height):
+        return abs(self.renderer.GetTiledAspectRatio() * height / width - 1) < 1e-3
+
     def seconds(self, angle):
         """Casting alone: what the mapper does for a frame, without showing it through OpenGL."""
         self.look(angle)
+        if not self.has_aspect(*self.window.GetActualSize()):
+            sys.exit("VTK's picture is not that of its window")
         start = time.perf_counter()
         self.mapper.PerVolumeInitialization(self.renderer, self.volume)
         self.mapper.PerSubVolumeInitialization(self.renderer, self.volume, 0)
@@ -164,29 +174,39 @@ def render(options, volume, transfer, size, lit, path, *words):
                 options.threads, *words)
 
 
-def compare(options, folder, volumes, transfer, size, lit, name):
-    """Milliseconds by who and frame, MS-SSIM of each frame of the dense volume, seconds of VTK's first frame."""
-    width, height = map(int, size.split("x"))
-    path = folder / "path.json"
-    frames = [{"orbit": [angle, ELEVATION, DISTANCE]} for angle in angles(options)]
-    path.write_text(json.dumps({"frames": frames}))
-    prefix = options.output / f"{name}-{size}-{'lit' if lit else 'unlit'}"
-    peer = Peer(folder / "dense.nrrd", transfer, options, lit)
-    first = time.perf_counter()
-    peer.picture(angles(options)[0], width, height, None)
-    first = time.perf_counter() - first
-    render(options, volumes["dense"], transfer, size, lit, path, "-o", f"{prefix}-ours-%02d.png", "--force")
-    similar = []
-    for i, angle in enumerate(angles(options)):
-        peer.picture(angle, width, height, f"{prefix}-vtk-{i:02}.png")
-        similar.append(tool(options, "voxdiff", f"{prefix}-vtk-{i:02}.png", f"{prefix}-ours-{i:02}.png")["ms_ssim"])
-    best = {who: [math.inf] * options.frames for who in ["VTK", *volumes]}
-    for _ in range(options.rounds):
-        best["VTK"] = [min(old, 1000 * peer.seconds(a)) for old, a in zip(best["VTK"], angles(options))]
-        for who, volume in volumes.items():
-            done = render(options, volume, transfer, size, lit, path, "--no-images")
-            best[who] = [min(old, frame["ms"]) for old, frame in zip(best[who], done["frames"])]
-    return best, similar, first
+class Comparison:
+    """A volume in pictures of one size, with or without light: VTK's and ours, and the least time of each frame."""
+
+    def __init__(self, options, folder, volumes, transfer, size, lit, name):
+        self.options, self.volumes, self.transfer, self.size, self.lit = options, volumes, transfer, size, lit
+        width, height = map(int, size.split("x"))
+        self.path = folder / "path.json"
+        frames = [{"orbit": [angle, ELEVATION, DISTANCE]} for angle in angles(options)]
+        self.path.write_text(json.dumps({"frames": frames}))
+        prefix = options.output / f"{name}-{size}-{'lit' if lit else 'unlit'}"
+        self.peer = Peer(folder / "dense.nrrd", transfer, options, lit)
+        start = time.perf_counter()
+        self.peer.picture(angles(options)[0], width, height, None)
+        self.first = time.perf_counter() - start
+        render(options, volumes["dense"], transfer, size, lit, self.path, "-o", f"{prefix}-ours-%02d.png", "--force")
+        self.similar = []
+        for i, angle in enumerate(angles(options)):
+            self.peer.picture(angle, width, height, f"{prefix}-vtk-{i:02}.png")
+            diff = tool(options, "voxdiff", f"{prefix}-vtk-{i:02}.png", f"{prefix}-ours-{i:02}.png")
+            self.similar.append(diff["ms_ssim"])
+        self.best = {who: [math.inf] * options.frames for who in ["VTK", *volumes]}
+
+    def draw(self, who):
+        """All frames once more."""
+        if who == "VTK":
+            times = [1000 * self.peer.seconds(angle) for angle in angles(self.options)]
+        else:
+            done = render(self.options, self.volumes[who], self.transfer, self.size, self.lit, self.path, "--no-images")
+            times = [frame["ms"] for frame in done["frames"]]
+        self.best[who] = [min(old, new) for old, new in zip(self.best[who], times)]
+
+    def median(self, who):
+        return statistics.median(self.best[who])
 
 
 def main():
@@ -223,18 +243,21 @@ def main():
                     volumes[who] = folder / f"{who.replace('/', '-')}.vqv"
                     tool(options, "vq-encode", folder / "dense.nrrd", "-o", volumes[who], "--force", *words)
             for size in options.sizes.split(","):
-                unlit = {}
-                for lit in (False, True):
-                    best, similar, first = compare(options, folder, volumes, pathlib.Path(transfer), size, lit, name)
-                    median = {who: statistics.median(ms) for who, ms in best.items()}
-                    for who, ms in best.items():
-                        cells = [name, size, "on" if lit else "off", who, f"{min(ms):.1f}", f"{median[who]:.1f}",
-                                 f"{median['VTK'] / median[who]:.2f}", f"{median[who] / median['dense']:.2f}",
-                                 f"{median[who] / unlit[who]:.2f}" if lit else "",
-                                 f"{min(similar):.4f}" if who == "dense" else
-                                 f"(first frame {first:.1f} s)" if who == "VTK" else ""]
+                unlit, lit = both = [Comparison(options, folder, volumes, pathlib.Path(transfer), size, light, name)
+                                     for light in (False, True)]
+                for _ in range(options.rounds):
+                    for who in unlit.best:
+                        unlit.draw(who)
+                        lit.draw(who)
+                for one in both:
+                    for who, ms in one.best.items():
+                        cells = [name, size, "on" if one is lit else "off", who, f"{min(ms):.1f}",
+                                 f"{one.median(who):.1f}", f"{one.median('VTK') / one.median(who):.2f}",
+                                 f"{one.median(who) / one.median('dense'):.2f}",
+                                 f"{lit.median(who) / unlit.median(who):.2f}" if one is lit else "",
+                                 f"{min(one.similar):.4f}" if who == "dense" else
+                                 f"(first frame {one.first:.1f} s)" if who == "VTK" else ""]
                         print("| " + " | ".join(cells) + " |", flush=True)
-                    unlit = median
         print(f"\nload {os.getloadavg()[0]:.1f} after")
 
 
