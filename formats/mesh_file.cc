@@ -298,7 +298,8 @@ Result<MeshParts> read(const std::string& path, Context& ctx) {
     if (!scene || (is_library(name) && !has_library))
       return bad_input(path,
                        fmt::format("{} is missing, which the mesh needs", name.substr(name.rfind('/') + 1)));
-  if (!scene || !scene->mRootNode) return bad_input(path, "not a mesh: " + reason(importer.GetErrorString()));
+  if (!scene || !scene->mRootNode)
+    return bad_input(path, "cannot read the mesh: " + reason(importer.GetErrorString()));
   return convert(*scene, use, transforms, path, ctx);
 }
 
@@ -308,7 +309,7 @@ Result<MeshParts> read_file(const std::string& path, Context& ctx) {
   } catch (const std::bad_alloc&) {
     return fail(ErrorCode::limit, path, "not enough memory to read the mesh");
   } catch (const std::exception& error) {
-    return bad_input(path, "not a mesh: " + reason(error.what()));
+    return bad_input(path, "cannot read the mesh: " + reason(error.what()));
   }
 }
 

@@ -186,7 +186,7 @@ void set_opacity(Texture& texture, const Texture& mask) {
 std::string find_texture(const std::string& folder, const std::string& name) {
   std::string slashes = name;
   std::replace(slashes.begin(), slashes.end(), '\\', '/');
-  const fs::path base = folder.empty() ? fs::path(".") : fs::path(folder);
+  const fs::path base(folder);
   for (const std::string& written : {slashes, unescaped(slashes)}) {
     if (written.empty() || written.find('\0') != std::string::npos) continue;
     for (const fs::path& path : {base / written, base / fs::path(written).filename()}) {

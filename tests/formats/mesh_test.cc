@@ -313,6 +313,32 @@ TEST_F(MeshFileTest, NamesOfTextures) {
   }
 }
 
+TEST_F(MeshFileTest, TexturesOfOtherFormats) {
+  // TGA: 2 x 2 texels of blue, green and red, from the top.
+  std::string tga(18, '\0');
+  tga[2] = 2, tga[12] = 2, tga[14] = 2, tga[16] = 24, tga[17] = 0x20;
+  put("a.tga", tga + std::string("\x01\x02\x03\x04\x05\x06\x07\x08\x09\x0a\x0b\x0c", 12));
+  // 16 bits are rounded to 8, floats are light.
+  auto fine = Image::create(1, 1, 1, SampleType::u16, ctx_),
+       light = Image::create(1, 1, 3, SampleType::f32, ctx_);
+  fine->row(0)[0] = 1000;
+  light->row(0)[0] = 0.5f, light->row(0)[1] = 2, light->row(0)[2] = NAN;
+  ASSERT_TRUE(write_image(path("a.png"), *fine, false));
+  ASSERT_TRUE(write_image(path("a.exr"), *light, false));
+  put("m.mtl", "newmtl a\nmap_Kd a.tga\nnewmtl b\nmap_Kd a.png\nnewmtl c\nmap_Kd a.exr\n");
+  const Mesh mesh = read(
+      "a.obj", obj_square("mtllib m.mtl\nusemtl a\n") + "usemtl b\nf 1/1 2/2 3/3\nusemtl c\nf 1/1 2/2 3/3\n");
+  ASSERT_EQ(mesh.textures.size(), 3u);
+  for (const MeshMaterial& material : mesh.materials) {
+    if (material.texture < 0) continue;
+    const auto have = texel(mesh, static_cast<size_t>(material.texture), 0, 0);
+    const std::array<int, 4> want = material.name == "a"   ? std::array{3, 2, 1, 255}
+                                    : material.name == "b" ? std::array{4, 4, 4, 255}
+                                                           : std::array{188, 255, 0, 255};
+    EXPECT_EQ(have, want) << material.name;
+  }
+}
+
 TEST_F(MeshFileTest, WhatIsMissingIsNamed) {
   put("m.mtl", "newmtl stone wall\nmap_Kd textures/brick.png\n");
   expect_error("a.obj", obj_square("mtllib m.mtl\nusemtl stone wall\n"), "textures/brick.png is missing");
@@ -361,7 +387,8 @@ TEST_F(MeshFileTest, TrianglesWithoutAreaAreDropped) {
   EXPECT_EQ(read("a.obj", vertices + "f 1 2 3\nf 1 2 4\nf 1 1 2\nf 2 2 2\np 1\nl 1 2\n").triangles.size(),
             1u);
   expect_error("a.obj", vertices + "f 1 2 4\n", "without triangles that have an area");
-  expect_error("a.obj", "# nothing\n", "not a mesh");
+  expect_error("a.obj", "# nothing\n", "cannot read the mesh");
+  expect_error("a.obj", vertices + "f 1 2 9\n", "out of range");
 }
 
 TEST_F(MeshFileTest, LimitOfMemory) {
