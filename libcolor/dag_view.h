@@ -95,26 +95,46 @@ inline DagView view_of(const Dag& dag) {
   return view;
 }
 
-/// Whether there is a voxel at a place, a Morton code inside the grid, and if so which colour it has.
+/// The number, among the colours of a leaf word with Colors::all, of that of the cell of height 0 to 2 around
+/// voxel `bit`.
+VOX_HD inline uint32_t leaf_cell_index(uint64_t leaf, uint32_t bit, int height) {
+  if (height == leaf_height) return 0;
+  if (height == 0) return leaf_index(leaf, bit, Colors::all);
+  const uint32_t octant = bit >> 3;
+  const uint64_t before = leaf & ((uint64_t{1} << 8 * octant) - 1);
+  return 1 + static_cast<uint32_t>(std::popcount(before) + std::popcount(leaf_octants(before)));
+}
+
+/// Whether there is a voxel in the cell of some height, 0 for the voxel itself, around a place, a Morton code
+/// inside the grid, and if so which colour the cell has. Above 0 only with Colors::all.
 struct Found {
   bool there = false;
   uint64_t color = 0;
 };
-VOX_HD inline Found find_voxel(const DagView& view, uint64_t place) {
+VOX_HD inline Found find_cell(const DagView& view, uint64_t place, int height) {
   uint32_t pointer = view.root;
   uint64_t color = 0;
   for (int h = view.height; h > leaf_height; --h) {
     const auto octant = static_cast<uint32_t>(place >> 3 * (h - 1) & 7);
     const NodeRef node = view.node(h, pointer);
-    if (node.words == nullptr || !node.has(octant)) return {};
+    if (node.words == nullptr) return {};
+    if (h == height) return {true, color};
+    if (!node.has(octant)) return {};
     const ChildRef child = view.child(node, h, octant);
     pointer = child.pointer;
     color += child.colors_before;
   }
   const auto bit = static_cast<uint32_t>(place & 63);
   const uint64_t leaf = view.leaf(pointer);
-  if ((leaf >> bit & 1) == 0) return {};
-  return {true, color + leaf_index(leaf, bit, view.colors)};
+  const int shift = 3 * height, width = 1 << shift;
+  const uint64_t cell =
+      height >= leaf_height ? leaf : leaf >> (bit >> shift << shift) & ((uint64_t{1} << width) - 1);
+  if (cell == 0) return {};
+  return {true,
+          color + (height == 0 ? leaf_index(leaf, bit, view.colors) : leaf_cell_index(leaf, bit, height))};
+}
+VOX_HD inline Found find_voxel(const DagView& view, uint64_t place) {
+  return find_cell(view, place, 0);
 }
 
 }  // namespace voxkit::color

@@ -47,6 +47,7 @@ Status cast(const DenseGrid& grid, const Camera& camera, const CastOptions& opti
             Context& ctx);
 Status cast(const SvmmGrid& grid, const Camera& camera, const CastOptions& options, Frame& frame,
             Context& ctx);
-Status cast(const DagGrid& grid, const Camera& camera, const CastOptions& options, Frame& frame, Context& ctx);
+Status cast(const DagGrid& grid, const Camera& camera, const CastOptions& options, Frame& frame,
+            Context& ctx);
 
 }  // namespace voxkit::render

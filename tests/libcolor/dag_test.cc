@@ -30,7 +30,8 @@ class PlainOrder {
       for (int h = 0; h <= height; ++h) cells_.insert({h, v.place >> 3 * h});
     if (!voxels.empty()) walk(height, 0);
   }
-  std::map<uint64_t, uint64_t> index;
+  std::map<uint64_t, uint64_t> index;                       ///< of voxels
+  std::map<std::pair<int, uint64_t>, uint64_t> cell_index;  ///< with Colors::all, of cells by height
   uint64_t count = 0;
 
  private:
@@ -39,7 +40,7 @@ class PlainOrder {
       index[cell] = count++;
       return;
     }
-    if (all_) ++count;
+    if (all_) cell_index[{h, cell}] = count++;
     for (uint64_t octant = 0; octant < 8; ++octant)
       if (cells_.count({h - 1, cell << 3 | octant})) walk(h - 1, cell << 3 | octant);
   }
@@ -83,6 +84,11 @@ TEST(Dag, VoxelsAndTheirColorsAreThoseOfTheTree) {
           const Found found = find_voxel(view, place);
           ASSERT_TRUE(found.there) << place;
           ASSERT_EQ(found.color, index) << place;
+        }
+        for (const auto& [cell, index] : order.cell_index) {
+          const Found found = find_cell(view, cell.second << 3 * cell.first, cell.first);
+          ASSERT_TRUE(found.there);
+          ASSERT_EQ(found.color, index) << "height " << cell.first;
         }
         // No other voxels: all places of small grids, neighbours in the large one.
         const uint64_t end = dag->voxels == 0 ? 64 : uint64_t{1} << 3 * std::min(c.height, 7);

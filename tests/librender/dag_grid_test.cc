@@ -2,6 +2,7 @@
 #include <gtest/gtest.h>
 
 #include "libcolor/color.h"
+#include "libcolor/store.h"
 #include "librender/camera.h"
 #include "librender/ray_cast.h"
 #include "tests/libcolor/scenes.h"
@@ -18,32 +19,14 @@ struct Fixture {
   }
 };
 
-class ListSource final : public color::SurfaceSource {
- public:
-  ListSource(color::Voxels voxels, Index3 dims) : voxels_(std::move(voxels)) {
-    info_.dims = dims;
-    info_.format = VoxelFormat::rgba32;
-    info_.spacing = {1, 0.75, 1.5};
-  }
-  Status read(Context&, const Sink& sink) override { return voxels_.empty() ? Status() : sink(voxels_); }
-
- private:
-  color::Voxels voxels_;
-};
+using color::ListSource;
 
 Result<std::shared_ptr<const color::Volume>> compressed(const color::Voxels& voxels, Index3 dims,
-                                                        color::Counts counts, Context& ctx) {
+                                                        color::Counts counts) {
   ListSource source(voxels, dims);
   color::Options options;
   options.counts = counts;
-  auto bytes = std::make_shared<std::vector<std::byte>>();
-  VOX_CHECK(color::encode(
-      source, options,
-      [&](std::span<const std::byte> some) -> Status {
-        bytes->insert(bytes->end(), some.begin(), some.end());
-        return {};
-      },
-      ctx));
+  const auto bytes = std::make_shared<const std::vector<std::byte>>(color::compressed(source, options));
   VOX_TRY(auto container, Container::open(*bytes, "file", bytes));
   return color::Volume::open(container);
 }
@@ -64,7 +47,7 @@ TEST(DagGrid, PicturesAreThoseOfTheVoxels) {
   for (const auto& [voxels, dims] : scenes)
     for (const color::Counts counts : {color::Counts::node, color::Counts::pointer}) {
       Fixture f;
-      const auto volume = compressed(voxels, dims, counts, f.ctx);
+      const auto volume = compressed(voxels, dims, counts);
       ASSERT_TRUE(volume) << volume.error().what;
       const auto decoded = color::open_source(*volume);
       const auto dense = DenseGrid::read(*decoded, f.ctx);
@@ -98,9 +81,65 @@ TEST(DagGrid, PicturesAreThoseOfTheVoxels) {
     }
 }
 
+/// Far away a ray ends at the first node that is as small as a pixel, and sees its colour.
+TEST(DagGrid, LevelsOfDetail) {
+  Fixture f;
+  color::Options settings;
+  settings.colors = color::Colors::all;
+  ListSource source(color::sphere_shell(7), Index3(128));
+  auto bytes = std::make_shared<std::vector<std::byte>>(color::compressed(source, settings));
+  auto container = Container::open(*bytes, "file", bytes);
+  ASSERT_TRUE(container);
+  const auto volume = color::Volume::open(*container);
+  ASSERT_TRUE(volume);
+  const DagGrid grid(*volume);
+  CastOptions options;
+  options.width = options.height = 64;
+  options.details = true;
+  // Close up voxels are larger than pixels.
+  Frame all, some;
+  ASSERT_TRUE(cast(grid, Camera::orbit(30, 20, 0.6, 20), options, all, f.ctx));
+  options.level_of_detail = true;
+  ASSERT_TRUE(cast(grid, Camera::orbit(30, 20, 0.6, 20), options, some, f.ctx));
+  for (size_t i = 0; i < all.pixels.size(); ++i)
+    for (int k = 0; k < 4; ++k) ASSERT_EQ(all.pixels[i].colour[k], some.pixels[i].colour[k]);
+  // From afar each pixel has the colour of a node around the voxel, as large as the cone there or half of it.
+  const Camera far = Camera::orbit(30, 20, 12, 45);
+  for (const Traversal traversal : {Traversal::path, Traversal::restart}) {
+    options.traversal = traversal;
+    ASSERT_TRUE(cast(grid, far, options, some, f.ctx));
+    EXPECT_GT(some.rays_hit, 0u);
+    const auto dag = (*volume)->store().dag((*volume)->container(), (*volume)->params());
+    ASSERT_TRUE(dag);
+    bool coarse = false;
+    for (size_t i = 0; i < some.pixels.size(); ++i) {
+      const int32_t(&v)[3] = some.details[i].voxel;
+      if (v[0] < 0) continue;
+      const uint64_t place = color::morton_code(static_cast<uint32_t>(v[0]), static_cast<uint32_t>(v[1]),
+                                                static_cast<uint32_t>(v[2]));
+      bool found = false;
+      for (int h = 0; h <= 7; ++h) {
+        const color::Found cell = color::find_cell(**dag, place, h);
+        if (!cell.there) continue;
+        const color::Rgb c = *(*volume)->color(cell.color);
+        const bool same = std::abs(some.pixels[i].colour[0] * 255 - c.r) < 0.01f &&
+                          std::abs(some.pixels[i].colour[1] * 255 - c.g) < 0.01f &&
+                          std::abs(some.pixels[i].colour[2] * 255 - c.b) < 0.01f;
+        found |= same;
+        coarse |= same && h > 2;
+      }
+      EXPECT_TRUE(found);
+    }
+    EXPECT_TRUE(coarse);
+  }
+  options.level_of_detail = false;
+  ASSERT_TRUE(cast(grid, far, options, all, f.ctx));
+  EXPECT_LT(some.blocks_touched, all.blocks_touched);
+}
+
 TEST(DagGrid, EmptySpaceIsCrossedInFewSteps) {
   Fixture f;
-  const auto volume = compressed({{(uint64_t{1} << 36) - 1, {}}}, Index3(4096), color::Counts::node, f.ctx);
+  const auto volume = compressed({{(uint64_t{1} << 36) - 1, {}}}, Index3(4096), color::Counts::node);
   ASSERT_TRUE(volume);
   CastOptions options;
   options.width = options.height = 32;
@@ -112,14 +151,7 @@ TEST(DagGrid, EmptySpaceIsCrossedInFewSteps) {
 TEST(DagGrid, DamagedColorsAreAnError) {
   Fixture f;
   ListSource source(color::sphere_shell(5), Index3(32));
-  auto bytes = std::make_shared<std::vector<std::byte>>();
-  ASSERT_TRUE(color::encode(
-      source, {},
-      [&](std::span<const std::byte> some) -> Status {
-        bytes->insert(bytes->end(), some.begin(), some.end());
-        return {};
-      },
-      f.ctx));
+  const auto bytes = std::make_shared<std::vector<std::byte>>(color::compressed(source, {}));
   auto container = Container::open(*bytes, "file", bytes);
   ASSERT_TRUE(container);
   for (const ChunkEntry& entry : (*container)->table())
