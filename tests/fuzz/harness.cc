@@ -138,7 +138,9 @@ Verdict read_mesh_file(const std::string& path) {
   if (const auto mesh = read_mesh(path, ctx); !mesh) {
     verdict = judge(mesh.error());
   } else {
-    if (mesh->triangles.empty()) return fault("a mesh without triangles");
+    // A .ply file may have points only.
+    if (mesh->triangles.empty() && (!path.ends_with(".ply") || mesh->positions.empty()))
+      return fault("a mesh of nothing");
     for (const MeshTriangle& triangle : mesh->triangles)
       for (const uint32_t v : triangle.vertices)
         if (v >= mesh->positions.size() || !std::isfinite(mesh->positions[v].x + mesh->positions[v].z))
