@@ -31,8 +31,11 @@ class Checker {
     }));
     VOX_CHECK(check_dag());
     const auto parts = static_cast<int64_t>(part_count(params_.color_count));
-    if (!has_threshold(params_.codec)) return {};  // any bytes are valid there
-    return parallel_for(ctx_, parts, [&](int64_t part) { return check_part(static_cast<uint64_t>(part)); });
+    if (params_.codec == ColorCodec::raw) return {};
+    return parallel_for(ctx_, parts, [&](int64_t part) {
+      return makes_textures(params_.codec) ? check_textures(static_cast<uint64_t>(part))
+                                           : check_part(static_cast<uint64_t>(part));
+    });
   }
 
  private:
@@ -126,6 +129,16 @@ class Checker {
       VOX_CHECK(check_extents(h - 1, view_.child(node, h, octant).pointer, at));
     }
     return {};
+  }
+
+  Status check_textures(uint64_t part) const {
+    const std::byte* const bytes = volume_.store().part(part, volume_.container());
+    if (bytes == nullptr) return volume_.store().status();
+    TextureReader reader;
+    reader.open(bytes, params_, colors_of_part(params_.color_count, part));
+    const uint32_t invalid = reader.first_invalid();
+    if (invalid == reader.blocks()) return {};
+    return bad(fmt::format("chunk COLR 0.{}: block {}: not a valid one", part, invalid));
   }
 
   Status check_part(uint64_t part) const {

@@ -12,8 +12,8 @@
 #include "formats/source.h"
 #include "libcolor/block_layout.h"
 #include "libcolor/dag.h"
-#include "libcolor/image_curve.h"
 #include "libcolor/surface.h"
+#include "libcolor/texture_layout.h"
 
 namespace voxkit::color {
 
@@ -21,10 +21,11 @@ class Store;
 
 /// How colours are stored. Numbers are part of FORMAT.md.
 enum class ColorCodec : uint8_t {
-  raw = 1,  ///< 24 bits each
-  fws = 2,  ///< variable bitrate blocks, weights of fixed size (section 4.2)
-  vws = 3,  ///< the same, weights of variable size (section 4.3)
-  bc1 = 4,  ///< an image of them, in blocks of 16 (section 4.1): 4 bits each
+  raw = 1,   ///< 24 bits each
+  astc = 5,  ///< the same, blocks of 16 bytes for 16 to 144 colours; not in every build
+  fws = 2,   ///< variable bitrate blocks, weights of fixed size (section 4.2)
+  vws = 3,   ///< the same, weights of variable size (section 4.3)
+  bc1 = 4,   ///< an image of them, in blocks of 16 (section 4.1): 4 bits each
 };
 
 /// Whether a codec keeps within a threshold.
@@ -34,7 +35,7 @@ constexpr bool has_threshold(ColorCodec codec) {
 
 /// Whether a codec lays colours into images, in blocks of textures.
 constexpr bool makes_textures(ColorCodec codec) {
-  return codec == ColorCodec::bc1;
+  return codec == ColorCodec::bc1 || codec == ColorCodec::astc;
 }
 
 /// What an encoder is asked for.
@@ -45,9 +46,13 @@ struct Options {
   int effort = 3;           ///< of fws and vws: 1: the paper's greedy merging; up to 9: smaller, slower; of
                             ///< textures: up to 9: nearer, slower
   ImageCurve image_curve = ImageCurve::morton;  ///< of textures
+  int quality = 100;                            ///< of astc: 100: blocks of 4 x 4; down to 0: of 12 x 12
   Colors colors = Colors::leaf;
   Counts counts = Counts::node;
 };
+
+/// The blocks of what is encoded with these options.
+BlockSize block_size_of(const Options& options);
 
 /// What a file says about itself.
 struct Params {
@@ -56,6 +61,7 @@ struct Params {
   Counts counts = Counts::node;
   Endpoints endpoints = Endpoints::rgb565;
   ImageCurve image_curve = ImageCurve::morton;  ///< of textures
+  BlockSize block_size;                         ///< of textures
   int height = leaf_height;                     ///< the grid is 2^height voxels a side
   uint32_t root = 0;
   uint64_t leaf_voxels = 0, color_count = 0;

@@ -6,6 +6,7 @@
 
 #include "formats/parallel.h"
 #include "formats/reservation.h"
+#include "libcolor/astc.h"
 #include "libcolor/block_encode.h"
 #include "libcolor/dag_builder.h"
 #include "libcolor/layout.h"
@@ -91,10 +92,17 @@ class ColorWriter {
 
 }  // namespace
 
+BlockSize block_size_of(const Options& options) {
+  return options.codec == ColorCodec::astc ? astc_block_size(options.quality) : BlockSize{};
+}
+
 Status validate(const Options& o) {
   if (!(o.threshold >= 0)) return bad_usage(fmt::format("threshold {}: expected 0 or more", o.threshold));
   if (o.weight_bits < 1 || o.weight_bits > most_weight_bits)
     return bad_usage(fmt::format("{} bits a weight: expected 1 to {}", o.weight_bits, most_weight_bits));
+  if (o.quality < 0 || o.quality > 100)
+    return bad_usage(fmt::format("quality {}: expected 0 to 100", o.quality));
+  VOX_CHECK(texture_support(o.codec));
   if (o.effort < 1 || o.effort > 9) return bad_usage(fmt::format("effort {}: expected 1 to 9", o.effort));
   return {};
 }
@@ -151,6 +159,7 @@ Result<Report> encode(SurfaceSource& source, const Options& options, const ByteS
   p.color_bytes = colors.bytes;
   p.blocks = colors.blocks;
   p.image_curve = options.image_curve;
+  p.block_size = block_size_of(options);
   if (has_threshold(options.codec)) {
     p.endpoints = endpoints_for(options.threshold);
     p.threshold = options.threshold;

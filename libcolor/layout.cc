@@ -5,6 +5,9 @@
 #include <algorithm>
 #include <bit>
 
+#include "libcolor/astc.h"
+#include "libcolor/texture.h"
+
 namespace voxkit::color {
 namespace {
 
@@ -28,6 +31,10 @@ std::vector<std::byte> pack_params(const Params& p) {
   bytes[5] = static_cast<std::byte>(p.weight_bits);
   bytes[6] = std::byte{morton_curve};
   if (makes_textures(p.codec)) bytes[7] = static_cast<std::byte>(p.image_curve);
+  if (p.codec == ColorCodec::astc) {
+    bytes[88] = static_cast<std::byte>(p.block_size.width);
+    bytes[89] = static_cast<std::byte>(p.block_size.height);
+  }
   store_le(&bytes[8], p.leaf_voxels);
   store_le(&bytes[16], p.color_count);
   store_le(&bytes[24], p.root);
@@ -56,7 +63,7 @@ Result<Params> unpack_params(std::span<const std::byte> bytes, const VolumeInfo&
     if (field(at) >= 1 && field(at) <= most) return {};
     return bad(at, fmt::format("unknown {} {}", what, field(at)));
   };
-  VOX_CHECK(is_one_of(0, 4, "color codec"));
+  VOX_CHECK(is_one_of(0, 5, "color codec"));
   VOX_CHECK(is_one_of(1, 2, "choice of colors"));
   VOX_CHECK(is_one_of(2, 2, "place of counts"));
   VOX_CHECK(is_one_of(3, 2, "kind of endpoints"));
@@ -69,6 +76,15 @@ Result<Params> unpack_params(std::span<const std::byte> bytes, const VolumeInfo&
   if (makes_textures(p.codec)) {
     VOX_CHECK(is_one_of(7, 2, "curve of images"));
     p.image_curve = static_cast<ImageCurve>(field(7));
+    if (const Status support = texture_support(p.codec); !support)
+      return bad_input(file, support.error().what);
+  }
+  if (p.codec == ColorCodec::astc) {
+    p.block_size = {std::to_integer<uint32_t>(bytes[88]), std::to_integer<uint32_t>(bytes[89])};
+    const auto sizes = astc_block_sizes();
+    if (std::find(sizes.begin(), sizes.end(), p.block_size) == sizes.end())
+      return bad(
+          88, fmt::format("blocks of {} x {}: not a size of ASTC", p.block_size.width, p.block_size.height));
   }
   p.height = field(4);
   p.weight_bits = field(5);

@@ -110,7 +110,8 @@ bool ColorReader::open(uint64_t part) {
   first_ = last_ = 0;
   part_ = bytes_ != nullptr ? part : ~uint64_t{0};
   if (bytes_ == nullptr) return false;
-  if (makes_textures(params_.codec)) texture_.open(bytes_, params_);
+  if (makes_textures(params_.codec))
+    texture_.open(bytes_, params_, colors_of_part(params_.color_count, part));
   if (has_threshold(params_.codec))
     view_ = PartView(bytes_, store_.part_bytes(part), colors_of_part(params_.color_count, part),
                      params_.endpoints);

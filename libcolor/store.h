@@ -63,7 +63,7 @@ class ColorReader {
     return view_.color_in(macro_, block_, within % macro_block_colors);
   }
   /// Blocks that have been looked up, for those who count.
-  uint64_t blocks_touched() const { return touched_ + texture_.blocks(); }
+  uint64_t blocks_touched() const { return touched_ + texture_.decoded(); }
 
  private:
   bool open(uint64_t part);

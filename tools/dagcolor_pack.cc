@@ -33,9 +33,9 @@ void declare(CommandLine& line, Options& o) {
               one_of(o.kind, {"thin", "conservative"}));
   line.option(
       "--codec", "CODEC",
-      "raw: 24 bits a colour; fws, vws: blocks with weights of fixed and of variable size; bc1: images, "
-      "as textures, 4 bits a colour (vws)",
-      one_of(o.codec, {"raw", "fws", "vws", "bc1"}));
+      "raw: 24 bits a colour; fws, vws: blocks with weights of fixed and of variable size; bc1, "
+      "astc: images, as textures, of 4 and of 0.89 to 8 bits a colour (vws)",
+      one_of(o.codec, {"raw", "fws", "vws", "bc1", "astc"}));
   line.option("-e,--threshold", "E",
               "Of blocks: no colour is further from the original, in RGB of 0 to 255 (9.56)",
               number(o.encoder.threshold, 0, 1e6));
@@ -46,6 +46,9 @@ void declare(CommandLine& line, Options& o) {
       "Of blocks: 1: greedy merging, as published; up to 9: smaller files, slower; of textures: up to 9: "
       "nearer, slower (3)",
       integer(o.encoder.effort, 1, 9));
+  line.option("--quality", "Q",
+              "Of astc: 100: blocks of 4 x 4, 8 bits a colour; down to 0: of 12 x 12, 0.89 bits (100)",
+              integer(o.encoder.quality, 0, 100));
   line.option("--image-curve", "CURVE",
               "Of textures: colours are laid along a curve: morton or hilbert (morton)",
               one_of(o.image_curve, {"morton", "hilbert"}));
@@ -63,10 +66,11 @@ void declare(CommandLine& line, Options& o) {
 
 color::Options encoder_options(const Options& o) {
   color::Options options = o.encoder;
-  options.codec = o.codec == "raw"   ? color::ColorCodec::raw
-                  : o.codec == "fws" ? color::ColorCodec::fws
-                  : o.codec == "bc1" ? color::ColorCodec::bc1
-                                     : color::ColorCodec::vws;
+  options.codec = o.codec == "raw"    ? color::ColorCodec::raw
+                  : o.codec == "fws"  ? color::ColorCodec::fws
+                  : o.codec == "bc1"  ? color::ColorCodec::bc1
+                  : o.codec == "astc" ? color::ColorCodec::astc
+                                      : color::ColorCodec::vws;
   options.image_curve = o.image_curve == "hilbert" ? color::ImageCurve::hilbert : color::ImageCurve::morton;
   options.colors = o.colors == "all" ? color::Colors::all : color::Colors::leaf;
   options.counts = o.counts == "pointer" ? color::Counts::pointer : color::Counts::node;

@@ -15,7 +15,7 @@ int main(int count, char** arguments) {
   const std::filesystem::path folder = std::filesystem::path(arguments[1]) / "color";
   std::filesystem::create_directories(folder);
   int number = 0;
-  for (const ColorCodec codec : {ColorCodec::raw, ColorCodec::fws, ColorCodec::vws, ColorCodec::bc1})
+  for (const ColorCodec codec : codecs())
     for (const Counts counts : {Counts::node, Counts::pointer})
       for (const Colors colors : {Colors::leaf, Colors::all}) {
         Options options;

@@ -21,7 +21,7 @@ int mutations() {
 const std::vector<Bytes>& files() {
   static const std::vector<Bytes> all = [] {
     std::vector<Bytes> made;
-    for (const ColorCodec codec : {ColorCodec::raw, ColorCodec::fws, ColorCodec::vws, ColorCodec::bc1})
+    for (const ColorCodec codec : codecs())
       for (const Counts counts : {Counts::node, Counts::pointer})
         for (const Colors colors : {Colors::leaf, Colors::all}) {
           Options options;
@@ -29,7 +29,10 @@ const std::vector<Bytes>& files() {
           options.counts = counts;
           options.colors = colors;
           if (colors == Colors::all) options.threshold = 3;
-          if (counts == Counts::pointer) options.image_curve = ImageCurve::hilbert;
+          if (counts == Counts::pointer) {
+            options.image_curve = ImageCurve::hilbert;
+            options.quality = 40;
+          }
           ListSource shell(sphere_shell(4), Index3(16)), few(scattered(6, 60, 1), Index3(64)),
               none({}, Index3(9, 2, 3));
           for (ListSource* source : {&shell, &few, &none}) made.push_back(compressed(*source, options));

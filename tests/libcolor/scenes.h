@@ -10,10 +10,23 @@
 #include "libcolor/color.h"
 #include "libcolor/morton.h"
 #include "libcolor/surface.h"
+#include "libcolor/texture.h"
 
 namespace voxkit::color {
 
 using Voxels = std::vector<SurfaceVoxel>;
+
+/// All codecs that make textures in this build; all codecs that it has.
+inline std::vector<ColorCodec> texture_codecs() {
+  std::vector<ColorCodec> codecs = {ColorCodec::bc1};
+  if (texture_support(ColorCodec::astc)) codecs.push_back(ColorCodec::astc);
+  return codecs;
+}
+inline std::vector<ColorCodec> codecs() {
+  std::vector<ColorCodec> codecs = {ColorCodec::raw, ColorCodec::fws, ColorCodec::vws};
+  for (const ColorCodec codec : texture_codecs()) codecs.push_back(codec);
+  return codecs;
+}
 
 inline Rgb color_at(uint64_t place) {
   const auto p = morton_place(place);

@@ -4,9 +4,11 @@
 #include <cmath>
 #include <set>
 
+#include "libcolor/astc.h"
 #include "libcolor/bc1.h"
 #include "libcolor/texture.h"
 #include "tests/libcolor/color_runs.h"
+#include "tests/libcolor/scenes.h"
 
 namespace voxkit::color {
 namespace {
@@ -17,6 +19,7 @@ Params params_of(const Options& options) {
   Params params;
   params.codec = options.codec;
   params.image_curve = options.image_curve;
+  params.block_size = block_size_of(options);
   return params;
 }
 
@@ -155,6 +158,85 @@ TEST(Bc1, IsCloseToTheBest) {
   EXPECT_LT(static_cast<double>(found), 1.02 * static_cast<double>(best));
 }
 
+/// Every colour has a block, each block has a colour or stands beside one, and no two colours share a place.
+TEST(TextureLayout, HasAPlaceForEveryColor) {
+  for (const ImageCurve curve : curves)
+    for (const BlockSize size : astc_block_sizes())
+      for (const uint32_t colors : {1u, 2u, 16u, 17u, 1000u, 70001u, part_colors - 1, part_colors}) {
+        const TextureLayout layout(curve, size, colors);
+        const uint32_t area = size.width * size.height;
+        std::vector<bool> taken(size_t{layout.blocks()} * area);
+        for (uint32_t i = 0; i < colors; ++i) {
+          const Pixel at = curve_pixel(curve, i);
+          const uint32_t block = layout.block_of(i, at), within = layout.within(at);
+          ASSERT_LT(block, layout.blocks());
+          ASSERT_LT(within, area);
+          const Pixel corner = layout.corner(block);
+          ASSERT_EQ(at, (Pixel{corner.x + within % size.width, corner.y + within / size.width}));
+          ASSERT_FALSE(taken[size_t{block} * area + within]);
+          taken[size_t{block} * area + within] = true;
+        }
+        // Little is wasted, but at the edges of few colours.
+        if (colors > 70000) {
+          EXPECT_LT(layout.blocks() * area, 1.2 * colors);
+        }
+      }
+}
+
+TEST(Astc, QualityIsASizeOfBlocks) {
+  EXPECT_EQ(astc_block_size(100), (BlockSize{4, 4}));
+  EXPECT_EQ(astc_block_size(0), (BlockSize{12, 12}));
+  uint32_t last = 0;
+  size_t sizes = 0;
+  for (int quality = 100; quality >= 0; --quality) {
+    const BlockSize size = astc_block_size(quality);
+    EXPECT_GE(size.width * size.height, last);
+    sizes += size.width * size.height != last;
+    last = size.width * size.height;
+  }
+  EXPECT_EQ(sizes, 14u);
+}
+
+TEST(Astc, EverySizeIsReadBackAndLargerOnesAreWorse) {
+  if (!texture_support(ColorCodec::astc)) GTEST_SKIP() << "built without libastcenc";
+  for (const ImageCurve curve : curves) {
+    const auto colors = color_cases(30000, 8)[4].colors;
+    uint64_t first = 0, last = 0;
+    for (const int quality : {100, 92, 84, 77, 69, 62, 54, 46, 38, 31, 23, 15, 8, 0}) {
+      Options options;
+      options.codec = ColorCodec::astc;
+      options.image_curve = curve;
+      options.quality = quality;
+      const EncodedPart part = encode_texture(colors, options);
+      const Params params = params_of(options);
+      TextureReader reader;
+      reader.open(part.bytes.data(), params, static_cast<uint32_t>(colors.size()));
+      EncodedPart seen;
+      for (uint32_t i = 0; i < colors.size(); ++i) seen.add_error(colors[i], reader.color(i));
+      EXPECT_EQ(seen.squared_error, part.squared_error);
+      (quality == 100 ? first : last) = seen.squared_error;
+    }
+    EXPECT_LT(std::sqrt(static_cast<double>(first) / 90000), 1.5);
+    EXPECT_GT(last, 4 * first);
+  }
+}
+
+/// By hand: a block of one colour, 16 bits a channel; one that is reserved.
+TEST(Astc, BlocksAreRead) {
+  if (!texture_support(ColorCodec::astc)) GTEST_SKIP() << "built without libastcenc";
+  std::array<std::byte, astc_block_bytes> block{};
+  store_le(block.data(), uint64_t{0xfffffffffffffdfc});
+  store_le(block.data() + 8, uint64_t{0xffff'1234'8000'ff00});
+  std::array<Rgb, 30> pixels;
+  decode_astc({6, 5}, block.data(), pixels.data());
+  EXPECT_TRUE(valid_astc({6, 5}, block.data()));
+  for (const Rgb c : pixels) EXPECT_EQ(c, (Rgb{0xff, 0x80, 0x12}));
+  block.fill({});
+  EXPECT_FALSE(valid_astc({6, 5}, block.data()));
+  decode_astc({6, 5}, block.data(), pixels.data());
+  for (const Rgb c : pixels) EXPECT_EQ(c, (Rgb{0xff, 0, 0xff}));
+}
+
 class Textures : public testing::TestWithParam<ColorCodec> {};
 
 TEST_P(Textures, WhatIsReadIsWhatEncodingSaid) {
@@ -169,8 +251,10 @@ TEST_P(Textures, WhatIsReadIsWhatEncodingSaid) {
         const Params params = params_of(options);
         ASSERT_EQ(part.bytes.size(), texture_bytes(params, static_cast<uint32_t>(size)));
         TextureReader in_order, at_random;
-        in_order.open(part.bytes.data(), params);
-        at_random.open(part.bytes.data(), params);
+        in_order.open(part.bytes.data(), params, static_cast<uint32_t>(size));
+        at_random.open(part.bytes.data(), params, static_cast<uint32_t>(size));
+        EXPECT_EQ(in_order.blocks(), part.blocks);
+        EXPECT_EQ(in_order.first_invalid(), part.blocks);
         EncodedPart seen;
         std::vector<Rgb> colors;
         for (uint32_t i = 0; i < size; ++i) {
@@ -206,7 +290,7 @@ TEST_P(Textures, SmoothColorsStayNearAndEffortHelps) {
   }
 }
 
-INSTANTIATE_TEST_SUITE_P(Codecs, Textures, testing::Values(ColorCodec::bc1));
+INSTANTIATE_TEST_SUITE_P(Codecs, Textures, testing::ValuesIn(texture_codecs()));
 
 }  // namespace
 }  // namespace voxkit::color

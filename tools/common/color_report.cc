@@ -7,7 +7,7 @@
 namespace voxkit::cli {
 
 std::string_view name(color::ColorCodec codec) {
-  constexpr std::string_view names[] = {"", "raw", "fws", "vws", "bc1"};
+  constexpr std::string_view names[] = {"", "raw", "fws", "vws", "bc1", "astc"};
   return names[static_cast<size_t>(codec)];
 }
 
@@ -23,7 +23,10 @@ Json params_json(const color::Params& p) {
     json.set("endpoints", p.endpoints == color::Endpoints::rgb565 ? "565" : "888");
   }
   if (p.codec == color::ColorCodec::fws) json.set("weight_bits", p.weight_bits);
-  if (color::makes_textures(p.codec)) json.set("image_curve", name(p.image_curve));
+  if (color::makes_textures(p.codec)) {
+    json.set("image_curve", name(p.image_curve));
+    json.set("block", fmt::format("{}x{}", p.block_size.width, p.block_size.height));
+  }
   json.set("colors", p.colors == color::Colors::leaf ? "leaf" : "all");
   json.set("counts", p.counts == color::Counts::node ? "node" : "pointer");
   return json;
@@ -50,7 +53,8 @@ std::string sizes_text(const color::Params& p) {
                       p.colors == color::Colors::leaf ? "voxels" : "voxels and nodes", p.color_bytes,
                       color_percent(p), p.grmse);
   if (color::makes_textures(p.codec))
-    text += fmt::format("images      {} blocks, along a {} curve\n", p.blocks, name(p.image_curve));
+    text += fmt::format("images      {} blocks of {} x {}, along a {} curve\n", p.blocks, p.block_size.width,
+                        p.block_size.height, name(p.image_curve));
   if (color::has_threshold(p.codec))
     text += fmt::format("blocks      {} in {} macro blocks, threshold {:.6g}\n", p.blocks, p.macro_blocks,
                         p.threshold);
