@@ -23,6 +23,7 @@ class Store;
 enum class ColorCodec : uint8_t {
   raw = 1,   ///< 24 bits each
   astc = 5,  ///< the same, blocks of 16 bytes for 16 to 144 colours; not in every build
+  bc7 = 6,   ///< the same, blocks of 16 bytes for 16 colours: 8 bits each
   fws = 2,   ///< variable bitrate blocks, weights of fixed size (section 4.2)
   vws = 3,   ///< the same, weights of variable size (section 4.3)
   bc1 = 4,   ///< an image of them, in blocks of 16 (section 4.1): 4 bits each
@@ -35,7 +36,7 @@ constexpr bool has_threshold(ColorCodec codec) {
 
 /// Whether a codec lays colours into images, in blocks of textures.
 constexpr bool makes_textures(ColorCodec codec) {
-  return codec == ColorCodec::bc1 || codec == ColorCodec::astc;
+  return codec == ColorCodec::bc1 || codec == ColorCodec::astc || codec == ColorCodec::bc7;
 }
 
 /// What an encoder is asked for.

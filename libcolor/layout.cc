@@ -63,7 +63,7 @@ Result<Params> unpack_params(std::span<const std::byte> bytes, const VolumeInfo&
     if (field(at) >= 1 && field(at) <= most) return {};
     return bad(at, fmt::format("unknown {} {}", what, field(at)));
   };
-  VOX_CHECK(is_one_of(0, 5, "color codec"));
+  VOX_CHECK(is_one_of(0, 6, "color codec"));
   VOX_CHECK(is_one_of(1, 2, "choice of colors"));
   VOX_CHECK(is_one_of(2, 2, "place of counts"));
   VOX_CHECK(is_one_of(3, 2, "kind of endpoints"));

@@ -5,6 +5,7 @@
 
 #include "libcolor/astc.h"
 #include "libcolor/bc1.h"
+#include "libcolor/bc7.h"
 
 namespace voxkit::color {
 namespace {
@@ -64,7 +65,9 @@ void encode_as_astc(std::span<const Rgb> colors, const Options& options, const T
 }  // namespace
 
 uint32_t texture_block_bytes(ColorCodec codec) {
-  return codec == ColorCodec::bc1 ? bc1_block_bytes : astc_block_bytes;
+  return codec == ColorCodec::bc1   ? bc1_block_bytes
+         : codec == ColorCodec::bc7 ? bc7_block_bytes
+                                    : astc_block_bytes;
 }
 
 uint64_t texture_bytes(const Params& params, uint32_t colors) {
@@ -90,8 +93,9 @@ EncodedPart encode_texture(std::span<const Rgb> colors, const Options& options) 
     encode_as_astc(colors, options, layout, part.bytes.data());
   } else {
     for (uint32_t block = 0; block < layout.blocks(); ++block)
-      encode_bc1(block_of_16(colors, options.image_curve, block), options.effort,
-                 &part.bytes[size_t{block} * bc1_block_bytes]);
+      (options.codec == ColorCodec::bc7 ? encode_bc7 : encode_bc1)(
+          block_of_16(colors, options.image_curve, block), options.effort,
+          &part.bytes[size_t{block} * texture_block_bytes(options.codec)]);
   }
   TextureReader reader;
   reader.open(part.bytes.data(), params, count);
@@ -108,8 +112,13 @@ void TextureReader::open(const std::byte* bytes, const Params& params, uint32_t 
 }
 
 uint32_t TextureReader::first_invalid() const {
-  uint32_t block = codec_ == ColorCodec::astc ? 0 : blocks();  // of bc1 all are valid
-  while (block < blocks() && valid_astc(layout_.size(), bytes_of(block))) ++block;
+  const auto valid = [&](uint32_t block) {
+    return codec_ == ColorCodec::bc1   ? true
+           : codec_ == ColorCodec::bc7 ? valid_bc7(bytes_of(block))
+                                       : valid_astc(layout_.size(), bytes_of(block));
+  };
+  uint32_t block = 0;
+  while (block < blocks() && valid(block)) ++block;
   return block;
 }
 
@@ -118,7 +127,7 @@ void TextureReader::decode(uint32_t block) {
     decode_astc(layout_.size(), bytes_of(block), pixels_.data());
   } else {
     Pixels16 pixels;
-    decode_bc1(bytes_of(block), pixels);
+    (codec_ == ColorCodec::bc7 ? decode_bc7 : decode_bc1)(bytes_of(block), pixels);
     std::copy(pixels.begin(), pixels.end(), pixels_.begin());
   }
   block_ = block;

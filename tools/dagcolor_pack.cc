@@ -31,11 +31,10 @@ void declare(CommandLine& line, Options& o) {
   line.option("--surface", "KIND",
               "Of a mesh: thin: no more voxels than make it tight; conservative: all that it touches (thin)",
               one_of(o.kind, {"thin", "conservative"}));
-  line.option(
-      "--codec", "CODEC",
-      "raw: 24 bits a colour; fws, vws: blocks with weights of fixed and of variable size; bc1, "
-      "astc: images, as textures, of 4 and of 0.89 to 8 bits a colour (vws)",
-      one_of(o.codec, {"raw", "fws", "vws", "bc1", "astc"}));
+  line.option("--codec", "CODEC",
+              "raw: 24 bits a colour; fws, vws: blocks with weights of fixed and of variable size; bc1, bc7, "
+              "astc: images, as textures, of 4, 8 and 0.89 to 8 bits a colour (vws)",
+              one_of(o.codec, {"raw", "fws", "vws", "bc1", "bc7", "astc"}));
   line.option("-e,--threshold", "E",
               "Of blocks: no colour is further from the original, in RGB of 0 to 255 (9.56)",
               number(o.encoder.threshold, 0, 1e6));
@@ -70,6 +69,7 @@ color::Options encoder_options(const Options& o) {
                   : o.codec == "fws"  ? color::ColorCodec::fws
                   : o.codec == "bc1"  ? color::ColorCodec::bc1
                   : o.codec == "astc" ? color::ColorCodec::astc
+                  : o.codec == "bc7"  ? color::ColorCodec::bc7
                                       : color::ColorCodec::vws;
   options.image_curve = o.image_curve == "hilbert" ? color::ImageCurve::hilbert : color::ImageCurve::morton;
   options.colors = o.colors == "all" ? color::Colors::all : color::Colors::leaf;

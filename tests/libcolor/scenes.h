@@ -18,7 +18,7 @@ using Voxels = std::vector<SurfaceVoxel>;
 
 /// All codecs that make textures in this build; all codecs that it has.
 inline std::vector<ColorCodec> texture_codecs() {
-  std::vector<ColorCodec> codecs = {ColorCodec::bc1};
+  std::vector<ColorCodec> codecs = {ColorCodec::bc1, ColorCodec::bc7};
   if (texture_support(ColorCodec::astc)) codecs.push_back(ColorCodec::astc);
   return codecs;
 }

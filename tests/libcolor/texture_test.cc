@@ -6,6 +6,8 @@
 
 #include "libcolor/astc.h"
 #include "libcolor/bc1.h"
+#include "libcolor/bc7.h"
+#include "libcolor/bc7_modes.h"
 #include "libcolor/texture.h"
 #include "tests/libcolor/color_runs.h"
 #include "tests/libcolor/scenes.h"
@@ -156,6 +158,80 @@ TEST(Bc1, IsCloseToTheBest) {
   }
   EXPECT_LE(found, quick);
   EXPECT_LT(static_cast<double>(found), 1.02 * static_cast<double>(best));
+}
+
+uint64_t bc7_error(const Pixels16& pixels, int effort) {
+  std::array<std::byte, bc7_block_bytes> block;
+  encode_bc7(pixels, effort, block.data());
+  EXPECT_TRUE(valid_bc7(block.data()));
+  Pixels16 read;
+  decode_bc7(block.data(), read);
+  return error_of(pixels, read);
+}
+
+/// Computed by hand: mode 6, whose ends are black and white with lowest bits 0 and 1, indices 0 to 15.
+TEST(Bc7, BlocksAreRead) {
+  std::array<std::byte, bc7_block_bytes> block{};
+  uint64_t low = 0x40, high = 0;
+  // Red, green, blue and alpha of both ends, 7 bits each, from bit 7 on: every second one has all bits.
+  for (int k = 0; k < 4; ++k) low |= uint64_t{127} << (7 + 14 * k + 7);
+  high |= 1;  // lowest bits: 0 of the first, at bit 63, and 1 of the second
+  for (uint64_t i = 1; i < 16; ++i) high |= i << 4 * i;
+  store_le(block.data(), low);
+  store_le(block.data() + 8, high);
+  Pixels16 pixels;
+  decode_bc7(block.data(), pixels);
+  constexpr std::array<int, 16> weights = {0, 4, 9, 13, 17, 21, 26, 30, 34, 38, 43, 47, 51, 55, 60, 64};
+  for (size_t i = 0; i < 16; ++i) {
+    const auto v = static_cast<uint8_t>((255 * weights[i] + 32) / 64);
+    EXPECT_EQ(pixels[i], (Rgb{v, v, v})) << i;
+  }
+  block.fill({});
+  EXPECT_FALSE(valid_bc7(block.data()));
+  decode_bc7(block.data(), pixels);
+  for (const Rgb c : pixels) EXPECT_EQ(c, Rgb{});
+}
+
+/// The modes fill 128 bits; each anchor is of its subset, as the highest bit of its index is not stored.
+TEST(Bc7, TablesAgreeWithEachOther) {
+  for (size_t m = 0; m < bc7::modes.size(); ++m) {
+    const bc7::Mode& mode = bc7::modes[m];
+    const int ends = 2 * mode.subsets;
+    EXPECT_EQ(static_cast<int>(m) + 1 + mode.partition_bits + mode.rotation_bits + mode.selection_bits +
+                  ends * (3 * mode.color_bits + mode.alpha_bits + mode.end_p) + mode.subsets * mode.shared_p +
+                  16 * (mode.index_bits + mode.second_bits) - mode.subsets - (mode.second_bits != 0 ? 1 : 0),
+              128)
+        << m;
+  }
+  for (const int subsets : {2, 3})
+    for (uint32_t partition = 0; partition < 64; ++partition)
+      for (uint32_t s = 0; s < static_cast<uint32_t>(subsets); ++s)
+        EXPECT_EQ(bc7::subset_of(subsets, partition, bc7::anchor_of(subsets, partition, s)), s)
+            << subsets << ' ' << partition;
+}
+
+/// Two and three surfaces in a block, along any partition: each keeps its colour.
+TEST(Bc7, SurfacesInABlockKeepTheirColors) {
+  const std::array<Rgb, 3> surfaces = {Rgb{200, 20, 30}, Rgb{10, 90, 220}, Rgb{30, 200, 60}};
+  for (const int subsets : {2, 3})
+    for (uint32_t partition = 0; partition < 64; ++partition) {
+      Pixels16 pixels;
+      for (uint32_t i = 0; i < 16; ++i) pixels[i] = surfaces[bc7::subset_of(subsets, partition, i)];
+      // Of three surfaces, ends of 5 bits are off by up to 4.
+      EXPECT_LE(bc7_error(pixels, 9), subsets == 2 ? 16u * 3 : 16u * 27) << subsets << ' ' << partition;
+      EXPECT_LT(bc7_error(pixels, 9), bc1_error(pixels, 9) / (subsets == 2 ? 1 : 4) + 49);
+    }
+}
+
+TEST(Bc7, PlainBlocksAndGradientsAreNear) {
+  for (int v = 0; v < 256; ++v) {
+    const auto x = static_cast<uint8_t>(v), y = static_cast<uint8_t>(v * 11);
+    Pixels16 pixels;
+    pixels.fill({x, y, static_cast<uint8_t>(255 - v)});
+    EXPECT_LE(bc7_error(pixels, 3), 16u * 3) << v;
+    for (size_t i = 0; i < 16; ++i) pixels[i] = {static_cast<uint8_t>(v / 2 + 2 * static_cast<int>(i)), x, y};
+    EXPECT_LE(bc7_error(pixels, 3), 16u * 3) << v;
+  }
 }
 
 /// Every colour has a block, each block has a colour or stands beside one, and no two colours share a place.

@@ -4,7 +4,7 @@
     dag_decode.py FILE.dagc OUT.raw    write the voxels, RGBA, x fastest
     dag_decode.py --info FILE.dagc     print what the headers say as JSON
 
-It decodes all that section 4 has but storage astc. It is meant to be read and to be trusted, not to be fast. Section numbers are those of FORMAT.md.
+It decodes all that section 4 has but storages astc and bc7. It is meant to be read and to be trusted, not to be fast. Section numbers are those of FORMAT.md.
 Exit codes: 0 done, 2 usage, 3 the file is unreadable, corrupt or unsupported, 4 cannot write, 5 too large.
 """
 
@@ -16,7 +16,7 @@ import sys
 from container import Container, Refused, Volume, require
 
 SURFACE = 3
-CODECS = {1: "raw", 2: "fws", 3: "vws", 4: "bc1", 5: "astc"}
+CODECS = {1: "raw", 2: "fws", 3: "vws", 4: "bc1", 5: "astc", 6: "bc7"}
 VOXELS, ALL = 1, 2
 IN_NODES, BESIDE = 1, 2
 WIDE = (1 << 24) - 1
@@ -48,7 +48,8 @@ class Surface:
         require(self.endpoints in (1, 2), "chunk DAGP: byte 3: {}", self.endpoints)
         require(curve == 1, "chunk DAGP: byte 6: {}", curve)
         require(CODECS[self.codec] != "bc1" or self.image_curve in (1, 2), "chunk DAGP: byte 7: {}", self.image_curve)
-        require(CODECS[self.codec] != "astc", "chunk DAGP: byte 0: ASTC is not supported by this decoder")
+        require(CODECS[self.codec] not in ("astc", "bc7"), "chunk DAGP: byte 0: {} is not supported by this decoder",
+                CODECS[self.codec])
         height = 2
         while 1 << height < max(self.volume.dims):
             height += 1

@@ -52,7 +52,7 @@ class SmallFile(unittest.TestCase):
 
     def test_broken_rules(self):
         for chunk, layout, offset, value in (
-                ("dagp", "<B", 0, 5), ("dagp", "<B", 0, 8), ("dagp", "<B", 1, 3), ("dagp", "<B", 2, 0), ("dagp", "<B", 3, 3),
+                ("dagp", "<B", 0, 5), ("dagp", "<B", 0, 6), ("dagp", "<B", 0, 8), ("dagp", "<B", 1, 3), ("dagp", "<B", 2, 0), ("dagp", "<B", 3, 3),
                 ("dagp", "<B", 4, 4), ("dagp", "<B", 6, 2), ("dagp", "<Q", 8, 11), ("dagp", "<Q", 16, 11),
                 ("dagp", "<Q", 8, 9), ("dagp", "<I", 24, 3), ("node", "<I", 4, 2), ("node", "<I", 0, 0b111),
                 ("colr", "<I", 0, 4), ("colr", "<Q", 8, 1), ("colr", "<Q", 16, 1), ("colr", "<I", 32, 0),

@@ -7,7 +7,7 @@
 namespace voxkit::cli {
 
 std::string_view name(color::ColorCodec codec) {
-  constexpr std::string_view names[] = {"", "raw", "fws", "vws", "bc1", "astc"};
+  constexpr std::string_view names[] = {"", "raw", "fws", "vws", "bc1", "astc", "bc7"};
   return names[static_cast<size_t>(codec)];
 }
 
