@@ -284,7 +284,8 @@ class File {
     const size_t count = model.voxels.size() / 4;
     // A scene may have a model any number of times: what it comes to is counted before it is made.
     placed_ += count + 1;
-    VOX_TRY(scene_.memory, MemoryHold::take(placed_ * 2 * sizeof(ModelVoxel), "the voxels of a scene", ctx_));
+    VOX_TRY(scene_.memory,
+            Reservation::take(placed_ * 2 * sizeof(ModelVoxel), "the voxels of a scene", ctx_));
     // Models in a scene turn about their middle; a file without a scene has its own corner at the origin.
     const std::array<int64_t, 3> middle =
         nodes_.empty() ? std::array<int64_t, 3>{}

@@ -6,7 +6,7 @@
 #include <string>
 #include <vector>
 
-#include "formats/memory_hold.h"
+#include "formats/reservation.h"
 #include "formats/volume.h"
 
 namespace voxkit {
@@ -21,7 +21,7 @@ struct ModelVoxel {
 /// counts. The axes are turned so that y points up, as renderers have it: x, z and -y of the file.
 struct VoxelScene {
   std::vector<ModelVoxel> voxels;
-  MemoryHold memory;  ///< of these, in ctx.memory
+  Reservation memory;  ///< of these, in ctx.memory
 };
 
 /// Reads version 150 and 200 files: sizes, voxels, palettes, and the scene's nodes with their first frames'

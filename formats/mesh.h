@@ -9,7 +9,7 @@
 #include <string>
 #include <vector>
 
-#include "formats/memory_hold.h"
+#include "formats/reservation.h"
 #include "formats/texture.h"
 
 namespace voxkit {
@@ -48,7 +48,7 @@ struct Mesh {
   std::vector<MeshTriangle> triangles;  ///< all of them have an area
   std::vector<MeshMaterial> materials;
   std::vector<Texture> textures;
-  std::vector<MemoryHold> memory;
+  std::vector<Reservation> memory;
 };
 
 /// Whether a name ends like a mesh: .obj, .gltf, .glb or .ply.

@@ -230,8 +230,8 @@ Result<MeshParts> convert(const aiScene& scene, const Conventions& use,
   Mesh& mesh = parts.mesh;
   const uint64_t vertex_bytes =
       sizeof(glm::dvec3) + has_uvs * sizeof(glm::vec2) + has_colors * sizeof(glm::vec4);
-  VOX_TRY(MemoryHold memory,
-          MemoryHold::take(vertices * vertex_bytes + triangles * sizeof(MeshTriangle), "the mesh", ctx));
+  VOX_TRY(Reservation memory,
+          Reservation::take(vertices * vertex_bytes + triangles * sizeof(MeshTriangle), "the mesh", ctx));
   mesh.memory.push_back(std::move(memory));
   mesh.positions.reserve(vertices);
   if (has_uvs) mesh.uvs.reserve(vertices);

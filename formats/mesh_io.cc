@@ -77,7 +77,7 @@ class System : public Assimp::IOSystem {
     }
     auto file = MappedFile::open(found);
     if (!file) return note(file.error());
-    auto hold = MemoryHold::take(importer_bytes(found, (*file)->bytes()), "reading the mesh", files_.ctx);
+    auto hold = Reservation::take(importer_bytes(found, (*file)->bytes()), "reading the mesh", files_.ctx);
     if (!hold) return note(hold.error());
     files_.memory.push_back(std::move(*hold));
     files_.opened.emplace_back(name);

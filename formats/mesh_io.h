@@ -7,7 +7,7 @@
 #include <vector>
 
 #include "formats/context.h"
-#include "formats/memory_hold.h"
+#include "formats/reservation.h"
 
 namespace voxkit {
 
@@ -16,7 +16,7 @@ struct MeshFiles {
   explicit MeshFiles(Context& context) : ctx(context) {}
   Context& ctx;
   std::vector<std::string> opened, missing;  ///< as they are spelt in the mesh
-  std::vector<MemoryHold> memory;            ///< what the importer makes of each
+  std::vector<Reservation> memory;           ///< what the importer makes of each
   Status status;                             ///< the first error that is not of a missing file
 };
 

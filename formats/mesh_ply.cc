@@ -261,7 +261,7 @@ class PlyReader {
     return {};
   }
   Status hold(uint64_t bytes) {
-    VOX_TRY(MemoryHold more, MemoryHold::take(bytes, "the mesh", ctx_));
+    VOX_TRY(Reservation more, Reservation::take(bytes, "the mesh", ctx_));
     parts_.mesh.memory.push_back(std::move(more));
     return {};
   }

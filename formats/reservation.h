@@ -1,17 +1,27 @@
-// Memory that counts against the user's limit while something holds it.
+// Memory that is not a Buffer's, counted against the user's limit while something lives.
 #pragma once
 
+#include <string>
 #include <utility>
 
 #include "formats/context.h"
 
 namespace voxkit {
 
-/// Memory that counts against the budget; given back at the end.
+/// Bytes of a budget, which must outlive it; given back at the end. Moves, does not copy.
 class Reservation {
  public:
+  Reservation() = default;
   explicit Reservation(MemoryBudget& budget) : budget_(&budget) {}
-  ~Reservation() { budget_->release(bytes_); }
+  /// Fails with ErrorCode::limit, naming `what`.
+  static Result<Reservation> take(uint64_t bytes, const std::string& what, const Context& ctx) {
+    Reservation reservation(*ctx.memory);
+    VOX_CHECK(reservation.add(bytes, what));
+    return reservation;
+  }
+  ~Reservation() {
+    if (budget_ != nullptr) budget_->release(bytes_);
+  }
   Reservation(Reservation&& other) noexcept
       : budget_(other.budget_), bytes_(std::exchange(other.bytes_, 0)) {}
   Reservation& operator=(Reservation&& other) noexcept {
@@ -19,7 +29,8 @@ class Reservation {
     std::swap(bytes_, other.bytes_);
     return *this;
   }
-  Status add(uint64_t bytes, const char* what) {
+  /// More of the same; not of one without a budget. Fails with ErrorCode::limit, naming `what`.
+  Status add(uint64_t bytes, const std::string& what) {
     VOX_CHECK(budget_->reserve(bytes, what));
     bytes_ += bytes;
     return {};
@@ -30,7 +41,7 @@ class Reservation {
   }
 
  private:
-  MemoryBudget* budget_;
+  MemoryBudget* budget_ = nullptr;
   uint64_t bytes_ = 0;
 };
 

@@ -14,7 +14,7 @@ namespace {
 class VoxelList final : public SurfaceSource {
  public:
   /// `voxels` ascend strictly.
-  VoxelList(VolumeInfo info, std::vector<SurfaceVoxel> voxels, MemoryHold memory)
+  VoxelList(VolumeInfo info, std::vector<SurfaceVoxel> voxels, Reservation memory)
       : voxels_(std::move(voxels)), memory_(std::move(memory)) {
     info_ = std::move(info);
     info_.format = VoxelFormat::rgba32;
@@ -23,7 +23,7 @@ class VoxelList final : public SurfaceSource {
 
  private:
   std::vector<SurfaceVoxel> voxels_;
-  MemoryHold memory_;
+  Reservation memory_;
 };
 
 bool by_place(const SurfaceVoxel& a, const SurfaceVoxel& b) {
@@ -49,8 +49,8 @@ Result<std::unique_ptr<SurfaceSource>> surface_of(VoxelScene scene, Context& ctx
       !checked_voxels(info.dims))
     return bad_input({}, fmt::format("a scene of {} x {} x {} voxels: expected at most {} a side",
                                      info.dims.x, info.dims.y, info.dims.z, 1 << most_levels));
-  VOX_TRY(MemoryHold memory, MemoryHold::take(scene.voxels.size() * 2 * sizeof(SurfaceVoxel),
-                                              "the voxels of a scene, sorted", ctx));
+  VOX_TRY(Reservation memory, Reservation::take(scene.voxels.size() * 2 * sizeof(SurfaceVoxel),
+                                                "the voxels of a scene, sorted", ctx));
   std::vector<SurfaceVoxel> voxels;
   voxels.reserve(scene.voxels.size());
   for (const ModelVoxel& v : scene.voxels)
@@ -92,8 +92,8 @@ Result<std::unique_ptr<SurfaceSource>> surface_of_points(Mesh points, int64_t re
     info.spacing[axis] = edge;
     info.origin[axis] = lo[a] + edge / 2;
   }
-  VOX_TRY(MemoryHold memory,
-          MemoryHold::take(points.positions.size() * 2 * sizeof(SurfaceVoxel), "points, sorted", ctx));
+  VOX_TRY(Reservation memory,
+          Reservation::take(points.positions.size() * 2 * sizeof(SurfaceVoxel), "points, sorted", ctx));
   const LightTables& tables = light_tables();
   const auto stored = [&](float light) {
     return tables.stored[static_cast<size_t>(std::lrint(std::clamp(light, 0.0f, 1.0f) * full_light))];

@@ -7,8 +7,8 @@
 #include <mutex>
 #include <utility>
 
-#include "formats/memory_hold.h"
 #include "formats/parallel.h"
+#include "formats/reservation.h"
 #include "libcolor/voxelise_tile.h"
 
 namespace voxkit::color {
@@ -56,7 +56,7 @@ class Parts {
     for (const Part& part : stack_) bytes += part.triangles.capacity() * sizeof(uint32_t);
     if (bytes <= counted_) return {};
     const uint64_t more = bytes - counted_ + (uint64_t{1} << 20);
-    VOX_TRY(MemoryHold hold, MemoryHold::take(more, "voxelising", ctx));
+    VOX_TRY(Reservation hold, Reservation::take(more, "voxelising", ctx));
     holds_.push_back(std::move(hold));
     counted_ += more;
     return {};
@@ -65,13 +65,13 @@ class Parts {
   const VoxelScene& scene_;
   int tile_bits_;
   std::vector<Part> stack_;
-  std::vector<MemoryHold> holds_;
+  std::vector<Reservation> holds_;
   uint64_t counted_ = 0;
 };
 
 class MeshSurface : public SurfaceSource {
  public:
-  MeshSurface(VoxelScene scene, const VolumeInfo& info, int tile_bits, MemoryHold memory)
+  MeshSurface(VoxelScene scene, const VolumeInfo& info, int tile_bits, Reservation memory)
       : scene_(std::move(scene)), memory_(std::move(memory)) {
     info_ = info;
     const int64_t side = std::max({info.dims.x, info.dims.y, info.dims.z});
@@ -84,10 +84,10 @@ class MeshSurface : public SurfaceSource {
     const uint64_t tile_bytes = sizeof(SurfaceVoxel) << (3 * tile_bits_);
     const auto threads = static_cast<uint64_t>(ctx.threads);
     uint64_t batch = std::clamp(ctx.memory->limit() / 8 / tile_bytes, uint64_t{1}, 32 * threads);
-    Result<MemoryHold> hold;
+    Result<Reservation> hold;
     for (;; batch /= 2) {
-      hold =
-          MemoryHold::take(threads * TileWork::bytes(tile_bits_) + 2 * batch * tile_bytes, "voxelising", ctx);
+      hold = Reservation::take(threads * TileWork::bytes(tile_bits_) + 2 * batch * tile_bytes, "voxelising",
+                               ctx);
       if (hold || batch == 1) break;
     }
     if (!hold) return tl::unexpected<Error>(hold.error());
@@ -141,7 +141,7 @@ class MeshSurface : public SurfaceSource {
   }
 
   VoxelScene scene_;
-  MemoryHold memory_;
+  Reservation memory_;
   Cube all_;
   int tile_bits_ = 0;
   std::mutex mutex_;
@@ -200,9 +200,9 @@ Result<std::unique_ptr<SurfaceSource>> make_surface(Mesh mesh, const VoxeliseOpt
     return bad_input({}, "a mesh without triangles, or of 2^32 or more");
   const Grid grid = fit(mesh, options.resolution);
   // Corners, and the numbers of triangles in the lists of the largest cubes.
-  VOX_TRY(MemoryHold memory,
-          MemoryHold::take(mesh.triangles.size() * (sizeof(SnappedTriangle) + 3 * sizeof(uint32_t)),
-                           "voxelising", ctx));
+  VOX_TRY(Reservation memory,
+          Reservation::take(mesh.triangles.size() * (sizeof(SnappedTriangle) + 3 * sizeof(uint32_t)),
+                            "voxelising", ctx));
   VoxelScene scene;
   scene.kind = options.kind;
   scene.corners.reserve(mesh.triangles.size());
