@@ -36,7 +36,6 @@ Subset subset_of(const Channels& v, int subsets, uint32_t partition, uint32_t nu
 /// differ.
 struct Line {
   Color mean{}, axis{};
-  float beside = 0;  ///< the sum of squared distances from it
 };
 Line line_of(const Subset& s) {
   Line line;
@@ -57,7 +56,6 @@ Line line_of(const Subset& s) {
   for (size_t k = 1; k < 3; ++k)
     if (m[k][k] > m[widest][widest]) widest = k;
   Color axis = {m[widest][0], m[widest][1], m[widest][2]};
-  float spread = 0;
   for (int round = 0; round < 4; ++round) {
     const float length = std::sqrt(axis[0] * axis[0] + axis[1] * axis[1] + axis[2] * axis[2]);
     if (!(length > 0)) return line;
@@ -65,9 +63,7 @@ Line line_of(const Subset& s) {
     line.axis = axis;
     for (size_t j = 0; j < 3; ++j)
       axis[j] = m[j][0] * line.axis[0] + m[j][1] * line.axis[1] + m[j][2] * line.axis[2];
-    spread = axis[0] * line.axis[0] + axis[1] * line.axis[1] + axis[2] * line.axis[2];
   }
-  line.beside = std::max(0.0f, m[0][0] + m[1][1] + m[2][2] - spread);
   return line;
 }
 
@@ -229,7 +225,6 @@ struct Plan {
 /// A way to part the pixels, with a line for each subset.
 struct Parting {
   uint32_t partition = 0;
-  float beside = 0;
   std::array<Subset, 3> subsets;
   std::array<Line, 3> lines;
 };
@@ -240,7 +235,6 @@ Parting parting_of(const Channels& v, int subsets, uint32_t partition) {
   for (uint32_t s = 0; s < static_cast<uint32_t>(subsets); ++s) {
     parting.subsets[s] = subset_of(v, subsets, partition, s);
     parting.lines[s] = line_of(parting.subsets[s]);
-    parting.beside += parting.lines[s].beside;
   }
   return parting;
 }
@@ -310,11 +304,50 @@ void write(Plan plan, std::byte* out) {
   bits.write(out);
 }
 
+/// Sums of the colours of some pixels and of their products; whole, and below 2^24.
+using Sums = std::array<float, 12>;  // r g b rr rg rb gg gb bb, and nothing
+
+/// About how much of `count` colours lies beside the line through them.
+float beside_line(const Sums& sums, float count) {
+  const float rr = sums[3] - sums[0] * sums[0] / count, rg = sums[4] - sums[0] * sums[1] / count,
+              rb = sums[5] - sums[0] * sums[2] / count, gg = sums[6] - sums[1] * sums[1] / count,
+              gb = sums[7] - sums[1] * sums[2] / count, bb = sums[8] - sums[2] * sums[2] / count,
+              all = rr + gg + bb;
+  if (!(all > 0)) return 0;
+  Color axis = rr >= gg && rr >= bb ? Color{rr, rg, rb} : gg >= bb ? Color{rg, gg, gb} : Color{rb, gb, bb};
+  float spread = 0;
+  for (int round = 0; round < 3; ++round) {
+    const Color next = {rr * axis[0] + rg * axis[1] + rb * axis[2],
+                        rg * axis[0] + gg * axis[1] + gb * axis[2],
+                        rb * axis[0] + gb * axis[1] + bb * axis[2]};
+    const float length = axis[0] * axis[0] + axis[1] * axis[1] + axis[2] * axis[2];
+    if (!(length > 0)) return all;
+    spread = (next[0] * axis[0] + next[1] * axis[1] + next[2] * axis[2]) / length;
+    for (size_t k = 0; k < 3; ++k) axis[k] = next[k] / all;
+  }
+  return std::max(0.0f, all - spread);
+}
+
 /// The partings with the least beside their lines, best first.
 std::vector<Parting> best_partings(const Channels& v, int subsets, size_t count) {
+  std::array<Sums, 16> pixels{};
+  for (size_t i = 0; i < 16; ++i) {
+    const float r = v[0][i], g = v[1][i], b = v[2][i];
+    pixels[i] = {r, g, b, r * r, r * g, r * b, g * g, g * b, b * b};
+  }
   std::array<std::pair<float, uint32_t>, 64> all;
-  for (uint32_t partition = 0; partition < 64; ++partition)
-    all[partition] = {parting_of(v, subsets, partition).beside, partition};
+  for (uint32_t partition = 0; partition < 64; ++partition) {
+    std::array<Sums, 3> sums{};
+    std::array<float, 3> counts{};
+    for (uint32_t i = 0; i < 16; ++i) {
+      const uint32_t s = bc7::subset_of(subsets, partition, i);
+      for (size_t k = 0; k < 12; ++k) sums[s][k] += pixels[i][k];
+      ++counts[s];
+    }
+    float beside = 0;
+    for (size_t s = 0; s < static_cast<size_t>(subsets); ++s) beside += beside_line(sums[s], counts[s]);
+    all[partition] = {beside, partition};
+  }
   std::partial_sort(all.begin(), all.begin() + static_cast<ptrdiff_t>(count), all.end());
   std::vector<Parting> best;
   for (size_t i = 0; i < count; ++i) best.push_back(parting_of(v, subsets, all[i].second));
