@@ -166,7 +166,7 @@ TEST(Container, AChangedChunkIsRefusedWhenItIsTouched) {
 
 TEST(Container, UnknownVersionsAndCodecsAreRefused) {
   for (size_t at : {8u, 10u})
-    for (uint16_t number : {uint16_t{0}, uint16_t{3}, uint16_t{0x100}, uint16_t{0xffff}}) {
+    for (uint16_t number : {uint16_t{0}, uint16_t{4}, uint16_t{0x100}, uint16_t{0xffff}}) {
       Bytes file = small_file();
       store_le(&file[at], number);
       test::reseal(file);
