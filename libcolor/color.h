@@ -22,11 +22,11 @@ class Store;
 /// How colours are stored. Numbers are part of FORMAT.md.
 enum class ColorCodec : uint8_t {
   raw = 1,   ///< 24 bits each
-  astc = 5,  ///< the same, blocks of 16 bytes for 16 to 144 colours; not in every build
-  bc7 = 6,   ///< the same, blocks of 16 bytes for 16 colours: 8 bits each
   fws = 2,   ///< variable bitrate blocks, weights of fixed size (section 4.2)
   vws = 3,   ///< the same, weights of variable size (section 4.3)
   bc1 = 4,   ///< an image of them, in blocks of 16 (section 4.1): 4 bits each
+  astc = 5,  ///< the same, blocks of 16 bytes for 16 to 144 colours; not in every build
+  bc7 = 6,   ///< the same, blocks of 16 bytes for 16 colours: 8 bits each
 };
 
 /// Whether a codec keeps within a threshold.

@@ -52,9 +52,12 @@ std::string encoded(const std::string& key, int threads) {
   const auto source = source_of(fields[0]);
   if (!source) return "no such scene";
   Options options;
-  options.codec = fields[1] == "raw"   ? ColorCodec::raw
-                  : fields[1] == "fws" ? ColorCodec::fws
-                                       : ColorCodec::vws;
+  const std::map<std::string, ColorCodec> codecs{{"raw", ColorCodec::raw},
+                                                 {"fws", ColorCodec::fws},
+                                                 {"vws", ColorCodec::vws},
+                                                 {"bc1", ColorCodec::bc1},
+                                                 {"bc7", ColorCodec::bc7}};
+  options.codec = codecs.at(fields[1]);
   options.threshold = std::stod(fields[2]);
   options.effort = std::stoi(fields[3]);
   options.colors = fields[4] == "all" ? Colors::all : Colors::leaf;
