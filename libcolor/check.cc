@@ -79,7 +79,7 @@ class Checker {
       const auto octants = static_cast<uint32_t>(std::popcount(node.mask));
       const bool beside = params_.counts == Counts::pointer;
       for (uint32_t i = 0; i < octants; ++i) {
-        const uint32_t pointer = node.words[1 + (beside ? 2 * i : i)];
+        const uint32_t pointer = view_.pointer(node, i);
         if (pointer >= children.size() || children[pointer].voxels == 0)
           return broken(fmt::format("pointer {}: nothing begins there", pointer));
         if (beside && node.words[2 + 2 * i] != own.colors)

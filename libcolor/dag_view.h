@@ -69,13 +69,18 @@ struct DagView {
     return wide[0] | static_cast<uint64_t>(wide[1]) << 32;
   }
 
+  /// The pointer to a node's child number i, of those that are there.
+  VOX_HD uint32_t pointer(const NodeRef& node, uint32_t i) const {
+    return node.words[1 + (counts == Counts::pointer ? 2 * i : i)];
+  }
+
   /// The child in an octant that is there, of a node of this height.
   VOX_HD ChildRef child(const NodeRef& node, int h, uint32_t octant) const {
     const uint32_t number = node.number(octant);
-    if (counts == Counts::pointer) return {node.words[1 + 2 * number], node.words[2 + 2 * number]};
+    if (counts == Counts::pointer) return {pointer(node, number), node.words[2 + 2 * number]};
     uint64_t before = colors == Colors::all ? 1 : 0;
-    for (uint32_t i = 0; i < number; ++i) before += colors_below(h - 1, node.words[1 + i]);
-    return {node.words[1 + number], before};
+    for (uint32_t i = 0; i < number; ++i) before += colors_below(h - 1, pointer(node, i));
+    return {pointer(node, number), before};
   }
 };
 

@@ -29,10 +29,9 @@ class Walk {
     if (h == leaf_height) return cell(view_.leaf(pointer), leaf_height);
     const size_t own = begin();
     const NodeRef ref = view_.node(h, pointer);
-    const uint32_t stride = view_.counts == Counts::pointer ? 2 : 1;
     Light sum;
     for (uint32_t i = 0; i < static_cast<uint32_t>(std::popcount(ref.mask)); ++i)
-      sum += node(h - 1, ref.words[1 + stride * i]);
+      sum += node(h - 1, view_.pointer(ref, i));
     return end(own, sum);
   }
 

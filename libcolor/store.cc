@@ -126,7 +126,6 @@ void ColorReader::find(uint32_t within) {
   if (macro_.raw) return;
   const uint32_t block = view_.find_block(macro_, within - base);
   if (block == macro_.last) return;
-  ++touched_;
   block_ = view_.block(block);
   first_ = base + block_.first;
   const uint32_t end = colors_of_part(params_.color_count, part_);

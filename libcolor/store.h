@@ -62,8 +62,6 @@ class ColorReader {
     if (first_ == last_) return view_.color(within);
     return view_.color_in(macro_, block_, within % macro_block_colors);
   }
-  /// Blocks that have been looked up, for those who count.
-  uint64_t blocks_touched() const { return touched_ + texture_.decoded(); }
 
  private:
   bool open(uint64_t part);
@@ -79,7 +77,6 @@ class ColorReader {
   PartView::MacroBlock macro_;
   PartView::Block block_;
   uint32_t first_ = 0, last_ = 0;  ///< colours of the part that the block has; none: not of a block
-  uint64_t touched_ = 0;
 };
 
 }  // namespace voxkit::color

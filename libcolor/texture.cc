@@ -131,7 +131,6 @@ void TextureReader::decode(uint32_t block) {
     std::copy(pixels.begin(), pixels.end(), pixels_.begin());
   }
   block_ = block;
-  ++decoded_;
 }
 
 }  // namespace voxkit::color

@@ -35,8 +35,6 @@ class TextureReader {
     if (const uint32_t block = layout_.block_of(index, at); block != block_) decode(block);
     return pixels_[layout_.within(at)];
   }
-  /// Blocks that have been decoded.
-  uint64_t decoded() const { return decoded_; }
   /// Blocks of the part; which of them is first not valid, or that number.
   uint32_t blocks() const { return layout_.blocks(); }
   uint32_t first_invalid() const;
@@ -52,7 +50,6 @@ class TextureReader {
   ImageCurve curve_ = ImageCurve::morton;
   TextureLayout layout_;
   uint32_t block_ = ~uint32_t{0};
-  uint64_t decoded_ = 0;
   std::array<Rgb, most_block_pixels> pixels_;
 };
 

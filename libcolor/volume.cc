@@ -37,21 +37,17 @@ class BoxWalk {
     const NodeRef ref = view_.node(h, pointer);
     if (ref.words == nullptr) return true;
     const int64_t side = int64_t{1} << (h - 1);
+    // Where counts are in nodes those of the octants before are added up, each once.
     uint64_t next = color + (view_.colors == Colors::all ? 1 : 0);
-    for (uint32_t octant = 0; octant < 8; ++octant) {
+    for (uint32_t octant = 0, i = 0; octant < 8; ++octant) {
       if (!ref.has(octant)) continue;
-      const uint32_t stride = view_.counts == Counts::pointer ? 2 : 1;
-      const uint32_t child = ref.words[1 + stride * ref.number(octant)];
+      const uint32_t child = view_.pointer(ref, i++);
+      if (view_.counts == Counts::pointer) next = color + view_.child(ref, h, octant).colors_before;
       const Index3 at = octant_corner(corner, octant, side);
-      if (!intersect({at, at + side}, box_).empty() &&
-          !node(h - 1, child, at, color_of(ref, octant, color, next), visit))
-        return false;
+      if (!intersect({at, at + side}, box_).empty() && !node(h - 1, child, at, next, visit)) return false;
       if (view_.counts == Counts::node) next += view_.colors_below(h - 1, child);
     }
     return true;
-  }
-  uint64_t color_of(const NodeRef& ref, uint32_t octant, uint64_t color, uint64_t next) const {
-    return view_.counts == Counts::node ? next : color + ref.words[2 + 2 * ref.number(octant)];
   }
 
   const DagView& view_;

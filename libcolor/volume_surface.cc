@@ -28,7 +28,8 @@ class VolumeSurface final : public SurfaceSource {
     Reservation reservation(*ctx.memory);
     batch_ = static_cast<size_t>(2 * ctx.threads);
     constexpr uint64_t tile_bytes = uint64_t{1} << 3 * tile_log2;
-    VOX_CHECK(reservation.add(batch_ * tile_bytes * (4 + sizeof(SurfaceVoxel)), "room for cubes of the volume"));
+    VOX_CHECK(
+        reservation.add(batch_ * tile_bytes * (4 + sizeof(SurfaceVoxel)), "room for cubes of the volume"));
     int height = tile_log2;
     while (tile_side << (height - tile_log2) < std::max({info_.dims.x, info_.dims.y, info_.dims.z})) ++height;
     VOX_CHECK(visit(height, Index3(0), sink, ctx));

@@ -40,8 +40,7 @@ struct DagCastView {
         const uint32_t octant = (x >> s & 1) | (y >> s & 1) << 1 | (z >> s & 1) << 2;
         ++nodes_;
         if (node.words == nullptr || !node.has(octant)) return {{}, s};
-        const uint32_t number = node.number(octant);
-        pointers_[s] = node.words[1 + (dag_.counts == color::Counts::pointer ? 2 * number : number)];
+        pointers_[s] = dag_.pointer(node, node.number(octant));
       }
       lowest_ = color::leaf_height;
       const uint64_t leaf = dag_.leaf(pointers_[color::leaf_height]);
