@@ -60,7 +60,11 @@ class Checker {
     if (all.voxels != params_.leaf_voxels || all.colors != params_.color_count)
       return bad(fmt::format("chunk DAGP: {} voxels and {} colors: below the root there are {} and {}",
                              params_.leaf_voxels, params_.color_count, all.voxels, all.colors));
-    return check_extents(params_.height, params_.root, Index3(0));
+    VOX_CHECK(check_extents(params_.height, params_.root, Index3(0)));
+    if (params_.counts == Counts::node) return {};
+    known_.resize((static_cast<size_t>(params_.height) + 1) * order_states);
+    VOX_CHECK(check_offsets(params_.height, params_.root, first_state(params_.curve)));
+    return {};
   }
 
   /// The nodes of a height, one after the other; what is below each.
@@ -82,9 +86,6 @@ class Checker {
         const uint32_t pointer = view_.pointer(node, i);
         if (pointer >= children.size() || children[pointer].voxels == 0)
           return broken(fmt::format("pointer {}: nothing begins there", pointer));
-        if (beside && node.words[2 + 2 * i] != own.colors)
-          return broken(
-              fmt::format("{} colors before an octant: expected {}", node.words[2 + 2 * i], own.colors));
         own.voxels += children[pointer].voxels;
         own.colors += children[pointer].colors;
       }
@@ -98,6 +99,30 @@ class Checker {
       at += node_words(octants, wide, params_.counts);
     }
     return below;
+  }
+
+  /// Counts beside pointers, of nodes that are gone through in a state and those below: how many colours.
+  Result<uint64_t> check_offsets(int h, uint32_t pointer, OrderState state) {
+    if (h == leaf_height) return uint64_t{leaf_colors(view_.leaf(pointer), params_.colors)};
+    std::vector<uint64_t>& known = known_[static_cast<size_t>(h) * order_states + state];
+    if (known.empty()) {
+      const uint64_t words = view_.words[static_cast<size_t>(h)];
+      VOX_CHECK(reservation_.add(words * sizeof(uint64_t), "a table of colors below nodes"));
+      known.resize(words);
+    }
+    if (known[pointer] != 0) return known[pointer];
+    const NodeRef node = view_.node(h, pointer);
+    uint64_t colors = params_.colors == Colors::all ? 1 : 0;
+    for (const uint8_t octant : octant_orders.octant[state]) {
+      if (!node.has(octant)) continue;
+      const ChildRef child = view_.child(node, h, octant, state);
+      if (child.colors_before != colors)
+        return bad(fmt::format("chunk NODE {}, word {}: {} colors before octant {}: expected {}", h, pointer,
+                               child.colors_before, octant, colors));
+      VOX_TRY(const uint64_t below, check_offsets(h - 1, child.pointer, octant_orders.next[state][octant]));
+      colors += below;
+    }
+    return known[pointer] = colors;
   }
 
   /// No voxel is outside the volume: of nodes that reach beyond it, those below. A node need be looked at
@@ -126,7 +151,7 @@ class Checker {
     for (uint32_t octant = 0; octant < 8; ++octant) {
       if (!node.has(octant)) continue;
       const Index3 at = corner + Index3(octant & 1, octant >> 1 & 1, octant >> 2) * (int64_t{1} << (h - 1));
-      VOX_CHECK(check_extents(h - 1, view_.child(node, h, octant).pointer, at));
+      VOX_CHECK(check_extents(h - 1, view_.pointer(node, node.number(octant)), at));
     }
     return {};
   }
@@ -182,7 +207,8 @@ class Checker {
   const DagView& view_;
   Context& ctx_;
   Reservation reservation_;
-  std::unordered_set<uint64_t> seen_;  ///< nodes that reach beyond the volume
+  std::unordered_set<uint64_t> seen_;         ///< nodes that reach beyond the volume
+  std::vector<std::vector<uint64_t>> known_;  ///< by height and state: colours below nodes; 0: not known
 };
 
 }  // namespace

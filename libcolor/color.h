@@ -50,6 +50,7 @@ struct Options {
   int quality = 100;                            ///< of astc: 100: blocks of 4 x 4; down to 0: of 12 x 12
   Colors colors = Colors::leaf;
   Counts counts = Counts::node;
+  Curve curve = Curve::morton;  ///< in which order voxels have their colours
 };
 
 /// The blocks of what is encoded with these options.
@@ -60,6 +61,7 @@ struct Params {
   ColorCodec codec = ColorCodec::vws;
   Colors colors = Colors::leaf;
   Counts counts = Counts::node;
+  Curve curve = Curve::morton;
   Endpoints endpoints = Endpoints::rgb565;
   ImageCurve image_curve = ImageCurve::morton;  ///< of textures
   BlockSize block_size;                         ///< of textures
@@ -88,7 +90,8 @@ struct Report {
 Status validate(const Options& options);
 
 /// Compresses `source` into a container written to `sink`, in one pass. Memory: the DAG and some parts of
-/// colours; with Colors::all, all colours. What is written does not depend on ctx.threads.
+/// colours; with Colors::all or along a Hilbert curve, all colours, twice. What is written does not depend on
+/// ctx.threads.
 Result<Report> encode(SurfaceSource& source, const Options& options, const ByteSink& sink, Context& ctx);
 
 /// A compressed surface, opened for random access. Safe on any bytes: every operation returns an error or a

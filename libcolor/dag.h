@@ -6,18 +6,16 @@
 // the voxel with the Morton code i. Above, a node is a run of 32 bit words:
 //
 //   word 0        bits 0 to 7: which octants there are, by their Morton number; bits 8 to 31: how many
-//   colours
-//                 there are below, or `wide_count`
+//                 colours there are below, or `wide_count`
 //   1 .. n        a pointer for each of the n octants: the number of a leaf, or of the first word of a node
-//   among
-//                 those of its height
+//                 among those of its height
 //   n + 1, n + 2  with `wide_count` only: the number of colours, 64 bits
 //
 // With Counts::pointer, which is Dado's variant, the count is zero and there is, after each pointer, how many
 // colours of this node come before the octant's.
 //
-// Colours are in the order of a walk, depth first. With Colors::all, each node, leaf word and octant of a
-// leaf word has a colour as well, before those below it.
+// Colours are in the order of a walk, depth first, along a curve. With Colors::all, each node, leaf word and
+// octant of a leaf word has a colour as well, before those below it.
 #pragma once
 
 #include <array>
@@ -27,6 +25,7 @@
 #include <vector>
 
 #include "formats/hd.h"
+#include "libcolor/octant_order.h"
 
 namespace voxkit::color {
 
@@ -56,11 +55,13 @@ VOX_HD constexpr uint32_t leaf_colors(uint64_t leaf, Colors colors) {
   if (colors == Colors::leaf) return voxels;
   return voxels + 1 + static_cast<uint32_t>(std::popcount(leaf_octants(leaf)));
 }
-/// The number, among the colours of a leaf word, of that of voxel `bit`, which is there.
-VOX_HD constexpr uint32_t leaf_index(uint64_t leaf, uint32_t bit, Colors colors) {
-  const auto before = static_cast<uint32_t>(std::popcount(leaf & ((uint64_t{1} << bit) - 1)));
+/// The number, among the colours of a leaf word that is gone through in a state, of that of voxel `bit`,
+/// which is there.
+inline uint32_t leaf_index(uint64_t leaf, uint32_t bit, Colors colors, OrderState state) {
+  const auto before = static_cast<uint32_t>(std::popcount(leaf & octant_orders.voxels_before[state][bit]));
   if (colors == Colors::leaf) return before;
-  const uint32_t octants = leaf_octants(leaf) & ((2u << (bit >> 3)) - 1);
+  const uint32_t octant = bit >> 3;
+  const uint32_t octants = leaf_octants(leaf) & (octant_orders.before[state][octant] | 1u << octant);
   return before + 1 + static_cast<uint32_t>(std::popcount(octants));
 }
 
@@ -75,6 +76,7 @@ struct Dag {
   int height = leaf_height;  ///< the side is 2^height voxels; of the root
   Colors colors = Colors::leaf;
   Counts counts = Counts::node;
+  Curve curve = Curve::morton;
   std::vector<uint64_t> leaves;
   std::vector<std::vector<uint32_t>> nodes;  ///< by height; the first ones, below 3, have none
   uint32_t root = 0;                         ///< the number of the root among those of its height

@@ -34,6 +34,7 @@ struct DagView {
   int height = leaf_height;
   Colors colors = Colors::leaf;
   Counts counts = Counts::node;
+  Curve curve = Curve::morton;
   uint32_t root = 0;
   const uint64_t* leaves = nullptr;
   uint64_t leaf_count = 0;
@@ -74,12 +75,14 @@ struct DagView {
     return node.words[1 + (counts == Counts::pointer ? 2 * i : i)];
   }
 
-  /// The child in an octant that is there, of a node of this height.
-  VOX_HD ChildRef child(const NodeRef& node, int h, uint32_t octant) const {
+  /// The child in an octant that is there, of a node of this height that is gone through in a state.
+  ChildRef child(const NodeRef& node, int h, uint32_t octant, OrderState state) const {
     const uint32_t number = node.number(octant);
     if (counts == Counts::pointer) return {pointer(node, number), node.words[2 + 2 * number]};
     uint64_t before = colors == Colors::all ? 1 : 0;
-    for (uint32_t i = 0; i < number; ++i) before += colors_below(h - 1, pointer(node, i));
+    for (uint32_t left = node.mask & octant_orders.before[state][octant]; left != 0; left &= left - 1)
+      before +=
+          colors_below(h - 1, pointer(node, node.number(static_cast<uint32_t>(std::countr_zero(left)))));
     return {pointer(node, number), before};
   }
 };
@@ -90,6 +93,7 @@ inline DagView view_of(const Dag& dag) {
   view.height = dag.height;
   view.colors = dag.colors;
   view.counts = dag.counts;
+  view.curve = dag.curve;
   view.root = dag.root;
   view.leaves = dag.leaves.data();
   view.leaf_count = dag.leaves.size();
@@ -102,11 +106,12 @@ inline DagView view_of(const Dag& dag) {
 
 /// The number, among the colours of a leaf word with Colors::all, of that of the cell of height 0 to 2 around
 /// voxel `bit`.
-VOX_HD inline uint32_t leaf_cell_index(uint64_t leaf, uint32_t bit, int height) {
+inline uint32_t leaf_cell_index(uint64_t leaf, uint32_t bit, int height, OrderState state) {
   if (height == leaf_height) return 0;
-  if (height == 0) return leaf_index(leaf, bit, Colors::all);
+  if (height == 0) return leaf_index(leaf, bit, Colors::all, state);
   const uint32_t octant = bit >> 3;
-  const uint64_t before = leaf & ((uint64_t{1} << 8 * octant) - 1);
+  const uint32_t first = 8 * octant + octant_orders.octant[octant_orders.next[state][octant]][0];
+  const uint64_t before = leaf & octant_orders.voxels_before[state][first];
   return 1 + static_cast<uint32_t>(std::popcount(before) + std::popcount(leaf_octants(before)));
 }
 
@@ -116,7 +121,8 @@ struct Found {
   bool there = false;
   uint64_t color = 0;
 };
-VOX_HD inline Found find_cell(const DagView& view, uint64_t place, int height) {
+inline Found find_cell(const DagView& view, uint64_t place, int height) {
+  OrderState state = first_state(view.curve);
   uint32_t pointer = view.root;
   uint64_t color = 0;
   for (int h = view.height; h > leaf_height; --h) {
@@ -125,9 +131,10 @@ VOX_HD inline Found find_cell(const DagView& view, uint64_t place, int height) {
     if (node.words == nullptr) return {};
     if (h == height) return {true, color};
     if (!node.has(octant)) return {};
-    const ChildRef child = view.child(node, h, octant);
+    const ChildRef child = view.child(node, h, octant, state);
     pointer = child.pointer;
     color += child.colors_before;
+    state = octant_orders.next[state][octant];
   }
   const auto bit = static_cast<uint32_t>(place & 63);
   const uint64_t leaf = view.leaf(pointer);
@@ -135,10 +142,10 @@ VOX_HD inline Found find_cell(const DagView& view, uint64_t place, int height) {
   const uint64_t cell =
       height >= leaf_height ? leaf : leaf >> (bit >> shift << shift) & ((uint64_t{1} << width) - 1);
   if (cell == 0) return {};
-  return {true,
-          color + (height == 0 ? leaf_index(leaf, bit, view.colors) : leaf_cell_index(leaf, bit, height))};
+  return {true, color + (height == 0 ? leaf_index(leaf, bit, view.colors, state)
+                                     : leaf_cell_index(leaf, bit, height, state))};
 }
-VOX_HD inline Found find_voxel(const DagView& view, uint64_t place) {
+inline Found find_voxel(const DagView& view, uint64_t place) {
   return find_cell(view, place, 0);
 }
 

@@ -8,9 +8,10 @@
 #include "formats/reservation.h"
 #include "libcolor/astc.h"
 #include "libcolor/block_encode.h"
+#include "libcolor/color_order.h"
 #include "libcolor/dag_builder.h"
+#include "libcolor/dag_recount.h"
 #include "libcolor/layout.h"
-#include "libcolor/node_colors.h"
 #include "libcolor/texture.h"
 
 namespace voxkit::color {
@@ -119,12 +120,13 @@ Result<Report> encode(SurfaceSource& source, const Options& options, const ByteS
 
   ColorWriter colors(options, container, ctx);
   VOX_CHECK(colors.begin());
-  DagBuilder builder(height, options.colors, options.counts, ctx);
-  std::vector<Rgb> held;  // with Colors::all, until the nodes above are known
+  DagBuilder builder(height, ctx);
+  const bool all = options.colors == Colors::all, reorder = all || options.curve != Curve::morton;
+  std::vector<Rgb> held;  // until the nodes above are known
   Reservation reservation(*ctx.memory);
   VOX_CHECK(source.read(ctx, [&](std::span<const SurfaceVoxel> run) -> Status {
     VOX_CHECK(builder.add(run));
-    if (options.colors == Colors::all) {
+    if (reorder) {
       VOX_CHECK(reservation.add(run.size() * sizeof(Rgb), "room for all colors"));
       for (const SurfaceVoxel& voxel : run) held.push_back(voxel.color);
     } else {
@@ -132,11 +134,20 @@ Result<Report> encode(SurfaceSource& source, const Options& options, const ByteS
     }
     return {};
   }));
-  VOX_TRY(const Dag dag, builder.finish());
-  if (options.colors == Colors::all) {
-    VOX_TRY(const std::vector<Rgb> all, node_colors(dag, held, reservation));
-    for (const Rgb color : all) VOX_CHECK(colors.add(color));
+  VOX_TRY(Dag dag, builder.finish());
+  dag.curve = options.curve;
+  Dag recounted;
+  const bool other_counts = all || options.counts != Counts::node;
+  if (other_counts) {
+    VOX_TRY(recounted, recount(dag, options.colors, options.counts, options.curve, ctx));
   }
+  if (reorder) {
+    const uint64_t count = other_counts ? recounted.color_count : dag.color_count;
+    VOX_TRY(const std::vector<Rgb> ordered,
+            colors_in_order(dag, count, options.colors, options.curve, held, reservation));
+    for (const Rgb color : ordered) VOX_CHECK(colors.add(color));
+  }
+  if (other_counts) dag = std::move(recounted);
   VOX_CHECK(colors.finish());
 
   Report report;
@@ -151,6 +162,7 @@ Result<Report> encode(SurfaceSource& source, const Options& options, const ByteS
   p.codec = options.codec;
   p.colors = options.colors;
   p.counts = options.counts;
+  p.curve = options.curve;
   p.height = height;
   p.root = dag.root;
   p.leaf_voxels = dag.voxels;

@@ -12,7 +12,6 @@ namespace voxkit::color {
 namespace {
 
 constexpr size_t params_bytes = 128;
-constexpr uint8_t morton_curve = 1;  // the order of octants
 
 }  // namespace
 
@@ -29,7 +28,7 @@ std::vector<std::byte> pack_params(const Params& p) {
   bytes[3] = static_cast<std::byte>(p.endpoints);
   bytes[4] = static_cast<std::byte>(p.height);
   bytes[5] = static_cast<std::byte>(p.weight_bits);
-  bytes[6] = std::byte{morton_curve};
+  bytes[6] = static_cast<std::byte>(p.curve);
   if (makes_textures(p.codec)) bytes[7] = static_cast<std::byte>(p.image_curve);
   if (p.codec == ColorCodec::astc) {
     bytes[88] = static_cast<std::byte>(p.block_size.width);
@@ -67,12 +66,13 @@ Result<Params> unpack_params(std::span<const std::byte> bytes, const VolumeInfo&
   VOX_CHECK(is_one_of(1, 2, "choice of colors"));
   VOX_CHECK(is_one_of(2, 2, "place of counts"));
   VOX_CHECK(is_one_of(3, 2, "kind of endpoints"));
-  VOX_CHECK(is_one_of(6, morton_curve, "curve"));
+  VOX_CHECK(is_one_of(6, 2, "curve"));
   Params p;
   p.codec = static_cast<ColorCodec>(field(0));
   p.colors = static_cast<Colors>(field(1));
   p.counts = static_cast<Counts>(field(2));
   p.endpoints = static_cast<Endpoints>(field(3));
+  p.curve = static_cast<Curve>(field(6));
   if (makes_textures(p.codec)) {
     VOX_CHECK(is_one_of(7, 2, "curve of images"));
     p.image_curve = static_cast<ImageCurve>(field(7));

@@ -74,6 +74,7 @@ Result<const DagView*> Store::dag(const Container& container, const Params& para
   view.height = params.height;
   view.colors = params.colors;
   view.counts = params.counts;
+  view.curve = params.curve;
   view.root = params.root;
   // Chunks begin at multiples of 64 in the file, so their words are aligned.
   VOX_TRY(const auto leaves, container.chunk(leaves_));

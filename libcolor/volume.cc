@@ -19,33 +19,44 @@ Index3 octant_corner(Index3 corner, uint32_t octant, int64_t side) {
   return corner + Index3(octant & 1, octant >> 1 & 1, octant >> 2) * side;
 }
 
-/// Walks through the nodes that touch a box, depth first, octants in order. `visit` gets leaf words, where
-/// they begin and the number of their first colour, and says whether to go on.
+/// Walks through the nodes that touch a box, in Morton order. `visit` gets leaf words, where they begin, the
+/// number of their first colour and how they are gone through, and says whether to go on.
 class BoxWalk {
  public:
   BoxWalk(const DagView& view, const Box& box) : view_(view), box_(box) {}
 
   template <class Visit>
   bool run(const Visit& visit) const {
-    return node(view_.height, view_.root, Index3(0), 0, visit);
+    return node(view_.height, view_.root, Index3(0), 0, first_state(view_.curve), visit);
   }
 
  private:
   template <class Visit>
-  bool node(int h, uint32_t pointer, Index3 corner, uint64_t color, const Visit& visit) const {
-    if (h == leaf_height) return visit(view_.leaf(pointer), corner, color);
+  bool node(int h, uint32_t pointer, Index3 corner, uint64_t color, OrderState state,
+            const Visit& visit) const {
+    if (h == leaf_height) return visit(view_.leaf(pointer), corner, color, state);
     const NodeRef ref = view_.node(h, pointer);
     if (ref.words == nullptr) return true;
     const int64_t side = int64_t{1} << (h - 1);
+    const auto& next_state = octant_orders.next[state];
+    std::array<ChildRef, 8> children;  // by octant
     // Where counts are in nodes those of the octants before are added up, each once.
-    uint64_t next = color + (view_.colors == Colors::all ? 1 : 0);
-    for (uint32_t octant = 0, i = 0; octant < 8; ++octant) {
+    uint64_t before = view_.colors == Colors::all ? 1 : 0;
+    for (const uint8_t octant : octant_orders.octant[state]) {
       if (!ref.has(octant)) continue;
-      const uint32_t child = view_.pointer(ref, i++);
-      if (view_.counts == Counts::pointer) next = color + view_.child(ref, h, octant).colors_before;
+      if (view_.counts == Counts::pointer) {
+        children[octant] = view_.child(ref, h, octant, state);
+        continue;
+      }
+      children[octant] = {view_.pointer(ref, ref.number(octant)), before};
+      before += view_.colors_below(h - 1, children[octant].pointer);
+    }
+    for (uint32_t octant = 0; octant < 8; ++octant) {
       const Index3 at = octant_corner(corner, octant, side);
-      if (!intersect({at, at + side}, box_).empty() && !node(h - 1, child, at, next, visit)) return false;
-      if (view_.counts == Counts::node) next += view_.colors_below(h - 1, child);
+      if (ref.has(octant) && !intersect({at, at + side}, box_).empty() &&
+          !node(h - 1, children[octant].pointer, at, color + children[octant].colors_before,
+                next_state[octant], visit))
+        return false;
     }
     return true;
   }
@@ -103,14 +114,14 @@ Status Volume::decode(const Box& box, VoxelSpan out) const {
   VOX_TRY(const DagView* const view, store_->dag(*container_, params_));
   fill(out, box.size(), VoxelFormat::rgba32, {});
   ColorReader reader(*store_, *container_, params_);
-  BoxWalk(*view, box).run([&](uint64_t leaf, Index3 corner, uint64_t color) {
+  BoxWalk(*view, box).run([&](uint64_t leaf, Index3 corner, uint64_t color, OrderState state) {
     const bool inside = box.contains(Box{corner, corner + leaf_side});
     for (uint64_t left = leaf; left != 0; left &= left - 1) {
       const auto bit = static_cast<uint32_t>(std::countr_zero(left));
       const auto at = morton_place(bit);
       const Index3 place = corner + Index3(at);
       if (!inside && !box.contains(place)) continue;
-      const Voxel voxel = opaque(reader.color(color + leaf_index(leaf, bit, view->colors)));
+      const Voxel voxel = opaque(reader.color(color + leaf_index(leaf, bit, view->colors, state)));
       const Index3 to = place - box.lo;
       std::memcpy(out.row(to.y, to.z) + to.x * 4, voxel.bytes.data(), 4);
     }
@@ -140,7 +151,7 @@ class BoxSearch {
     const NodeRef ref = view_.node(h, pointer);
     if (ref.words == nullptr) return true;
     for (uint32_t octant = 0; octant < 8; ++octant)
-      if (ref.has(octant) && may_have_voxels(h - 1, view_.child(ref, h, octant).pointer,
+      if (ref.has(octant) && may_have_voxels(h - 1, view_.pointer(ref, ref.number(octant)),
                                              octant_corner(corner, octant, int64_t{1} << (h - 1))))
         return true;
     return false;
@@ -178,18 +189,19 @@ Status Volume::for_each_voxel(const SurfaceSource::Sink& sink, Context&) const {
     run.clear();
     return status.has_value();
   };
-  const bool complete = BoxWalk(*view, info_.box()).run([&](uint64_t leaf, Index3 corner, uint64_t color) {
-    const uint64_t first = morton_code(static_cast<uint32_t>(corner.x), static_cast<uint32_t>(corner.y),
-                                       static_cast<uint32_t>(corner.z));
-    // A word without voxels is of no surface, and there may be any number of them.
-    found += static_cast<uint64_t>(std::popcount(leaf));
-    if (leaf == 0 || found > params_.leaf_voxels) return false;
-    for (uint64_t left = leaf; left != 0; left &= left - 1) {
-      const auto bit = static_cast<uint32_t>(std::countr_zero(left));
-      run.push_back({first | bit, reader.color(color + leaf_index(leaf, bit, view->colors))});
-    }
-    return run.size() < run_voxels || flush();
-  });
+  const bool complete =
+      BoxWalk(*view, info_.box()).run([&](uint64_t leaf, Index3 corner, uint64_t color, OrderState state) {
+        const uint64_t first = morton_code(static_cast<uint32_t>(corner.x), static_cast<uint32_t>(corner.y),
+                                           static_cast<uint32_t>(corner.z));
+        // A word without voxels is of no surface, and there may be any number of them.
+        found += static_cast<uint64_t>(std::popcount(leaf));
+        if (leaf == 0 || found > params_.leaf_voxels) return false;
+        for (uint64_t left = leaf; left != 0; left &= left - 1) {
+          const auto bit = static_cast<uint32_t>(std::countr_zero(left));
+          run.push_back({first | bit, reader.color(color + leaf_index(leaf, bit, view->colors, state))});
+        }
+        return run.size() < run_voxels || flush();
+      });
   if (complete) flush();
   if (status && (!complete || found != params_.leaf_voxels))
     return bad_input(container_->name(),

@@ -15,7 +15,8 @@ namespace {
 struct Options {
   std::string input, output;
   SurfaceOptions surface;
-  std::string kind = "thin", codec = "vws", image_curve = "morton", colors = "leaf", counts = "node";
+  std::string kind = "thin", codec = "vws", image_curve = "morton", curve = "morton", colors = "leaf",
+              counts = "node";
   color::Options encoder;
   bool verify = false;
 };
@@ -51,6 +52,11 @@ void declare(CommandLine& line, Options& o) {
   line.option("--image-curve", "CURVE",
               "Of textures: colours are laid along a curve: morton or hilbert (morton)",
               one_of(o.image_curve, {"morton", "hilbert"}));
+  line.option("--curve", "CURVE",
+              "Colours are in the order of a curve through space: morton or hilbert; hilbert: a little "
+              "smaller, all colours "
+              "are held in memory (morton)",
+              one_of(o.curve, {"morton", "hilbert"}));
   line.option("--colors", "WHICH", "leaf: those of voxels; all: of all nodes, too (leaf)",
               one_of(o.colors, {"leaf", "all"}));
   line.option("--counts", "WHERE", "node: counts in nodes; pointer: beside pointers, larger, faster (node)",
@@ -72,6 +78,7 @@ color::Options encoder_options(const Options& o) {
                   : o.codec == "bc7"  ? color::ColorCodec::bc7
                                       : color::ColorCodec::vws;
   options.image_curve = o.image_curve == "hilbert" ? color::ImageCurve::hilbert : color::ImageCurve::morton;
+  options.curve = o.curve == "hilbert" ? color::Curve::hilbert : color::Curve::morton;
   options.colors = o.colors == "all" ? color::Colors::all : color::Colors::leaf;
   options.counts = o.counts == "pointer" ? color::Counts::pointer : color::Counts::node;
   return options;

@@ -2,50 +2,64 @@
 // it.
 #include <gtest/gtest.h>
 
+#include <glm/common.hpp>
 #include <map>
 #include <set>
 
 #include "libcolor/dag_builder.h"
+#include "libcolor/dag_recount.h"
 #include "libcolor/dag_view.h"
+#include "libcolor/morton.h"
 #include "tests/libcolor/scenes.h"
 
 namespace voxkit::color {
 namespace {
 
-Result<Dag> build(const Voxels& voxels, int height, Colors colors, Counts counts, size_t run = 1000) {
+Result<Dag> build(const Voxels& voxels, int height, size_t run = 1000) {
   MemoryBudget memory;
   Context ctx;
   ctx.memory = &memory;
-  DagBuilder builder(height, colors, counts, ctx);
+  DagBuilder builder(height, ctx);
   for (size_t i = 0; i < voxels.size(); i += run)
     VOX_CHECK(builder.add(std::span(voxels).subspan(i, std::min(run, voxels.size() - i))));
   return builder.finish();
 }
 
+Result<Dag> build(const Voxels& voxels, int height, Colors colors, Counts counts, Curve curve) {
+  VOX_TRY(const Dag dag, build(voxels, height));
+  MemoryBudget memory;
+  Context ctx;
+  ctx.memory = &memory;
+  return recount(dag, colors, counts, curve, ctx);
+}
+
 /// Numbers colours by walking through all cells, level by level downwards, as the paper's definition has it.
 class PlainOrder {
  public:
-  PlainOrder(const Voxels& voxels, int height, Colors colors) : all_(colors == Colors::all) {
+  PlainOrder(const Voxels& voxels, int height, Colors colors, Curve curve)
+      : all_(colors == Colors::all), curve_(curve) {
     for (const SurfaceVoxel& v : voxels)
       for (int h = 0; h <= height; ++h) cells_.insert({h, v.place >> 3 * h});
-    if (!voxels.empty()) walk(height, 0);
+    if (!voxels.empty()) walk(height, 0, first_state(curve_));
   }
   std::map<uint64_t, uint64_t> index;                       ///< of voxels
   std::map<std::pair<int, uint64_t>, uint64_t> cell_index;  ///< with Colors::all, of cells by height
   uint64_t count = 0;
 
  private:
-  void walk(int h, uint64_t cell) {
+  void walk(int h, uint64_t cell, OrderState state) {
     if (h == 0) {
       index[cell] = count++;
       return;
     }
     if (all_) cell_index[{h, cell}] = count++;
-    for (uint64_t octant = 0; octant < 8; ++octant)
-      if (cells_.count({h - 1, cell << 3 | octant})) walk(h - 1, cell << 3 | octant);
+    for (const uint64_t octant : octant_orders.octant[state])
+      if (cells_.count({h - 1, cell << 3 | octant}))
+        walk(h - 1, cell << 3 | octant, octant_orders.next[state][octant]);
   }
   std::set<std::pair<int, uint64_t>> cells_;
   bool all_;
+  Curve curve_;
 };
 
 struct Case {
@@ -69,40 +83,89 @@ std::vector<Case> cases() {
   return all;
 }
 
+struct Variant {
+  Colors colors;
+  Counts counts;
+  Curve curve;
+};
+std::vector<Variant> variants() {
+  std::vector<Variant> all;
+  for (const Colors colors : {Colors::leaf, Colors::all})
+    for (const Counts counts : {Counts::node, Counts::pointer})
+      for (const Curve curve : {Curve::morton, Curve::hilbert}) all.push_back({colors, counts, curve});
+  return all;
+}
+
+TEST(OctantOrder, TheHilbertCurveGoesFromVoxelToVoxel) {
+  for (int height = 1; height <= 6; ++height) {
+    std::vector<uint64_t> places;
+    const auto walk = [&](const auto& self, int h, uint64_t cell, OrderState state) -> void {
+      if (h == 0) return places.push_back(cell);
+      for (const uint64_t octant : octant_orders.octant[state])
+        self(self, h - 1, cell << 3 | octant, octant_orders.next[state][octant]);
+    };
+    walk(walk, height, 0, first_state(Curve::hilbert));
+    EXPECT_EQ(std::set(places.begin(), places.end()).size(), uint64_t{1} << 3 * height);
+    for (size_t i = 1; i < places.size(); ++i) {
+      const glm::ivec3 step =
+          glm::abs(glm::ivec3(morton_place(places[i])) - glm::ivec3(morton_place(places[i - 1])));
+      ASSERT_EQ(step.x + step.y + step.z, 1) << i;
+    }
+    EXPECT_EQ(places.front(), 0u);
+    EXPECT_EQ(places.back(), morton_code((1u << height) - 1, 0, 0));
+  }
+}
+
+TEST(OctantOrder, WhatIsBeforeIsAMask) {
+  for (OrderState state = 0; state < order_states; ++state) {
+    uint32_t octants = 0;
+    uint64_t voxels = 0;
+    for (const uint8_t octant : octant_orders.octant[state]) {
+      EXPECT_EQ(octant_orders.before[state][octant], octants);
+      octants |= 1u << octant;
+      for (const uint8_t voxel : octant_orders.octant[octant_orders.next[state][octant]]) {
+        EXPECT_EQ(octant_orders.voxels_before[state][8u * octant + voxel], voxels);
+        voxels |= uint64_t{1} << (8 * octant + voxel);
+      }
+    }
+    EXPECT_EQ(octants, 0xffu);
+    EXPECT_EQ(voxels, ~uint64_t{0});
+  }
+}
+
 TEST(Dag, VoxelsAndTheirColorsAreThoseOfTheTree) {
   for (const Case& c : cases())
-    for (const Colors colors : {Colors::leaf, Colors::all})
-      for (const Counts counts : {Counts::node, Counts::pointer}) {
-        SCOPED_TRACE(c.name);
-        const auto dag = build(c.voxels, c.height, colors, counts);
-        ASSERT_TRUE(dag) << dag.error().what;
-        const PlainOrder order(c.voxels, c.height, colors);
-        EXPECT_EQ(dag->voxels, c.voxels.size());
-        EXPECT_EQ(dag->color_count, order.count);
-        const DagView view = view_of(*dag);
-        for (const auto& [place, index] : order.index) {
-          const Found found = find_voxel(view, place);
-          ASSERT_TRUE(found.there) << place;
-          ASSERT_EQ(found.color, index) << place;
-        }
-        for (const auto& [cell, index] : order.cell_index) {
-          const Found found = find_cell(view, cell.second << 3 * cell.first, cell.first);
-          ASSERT_TRUE(found.there);
-          ASSERT_EQ(found.color, index) << "height " << cell.first;
-        }
-        // No other voxels: all places of small grids, neighbours in the large one.
-        const uint64_t end = dag->voxels == 0 ? 64 : uint64_t{1} << 3 * std::min(c.height, 7);
-        for (uint64_t place = 0; place < end; ++place)
-          ASSERT_EQ(find_voxel(view, place).there, order.index.count(place) == 1) << place;
-        for (const SurfaceVoxel& v : c.voxels)
-          if (c.height > 7) {
-            ASSERT_EQ(find_voxel(view, v.place ^ 1).there, order.index.count(v.place ^ 1) == 1);
-          }
+    for (const auto& [colors, counts, curve] : variants()) {
+      SCOPED_TRACE(c.name);
+      const auto dag = build(c.voxels, c.height, colors, counts, curve);
+      ASSERT_TRUE(dag) << dag.error().what;
+      const PlainOrder order(c.voxels, c.height, colors, curve);
+      EXPECT_EQ(dag->voxels, c.voxels.size());
+      EXPECT_EQ(dag->color_count, order.count);
+      const DagView view = view_of(*dag);
+      for (const auto& [place, index] : order.index) {
+        const Found found = find_voxel(view, place);
+        ASSERT_TRUE(found.there) << place;
+        ASSERT_EQ(found.color, index) << place;
       }
+      for (const auto& [cell, index] : order.cell_index) {
+        const Found found = find_cell(view, cell.second << 3 * cell.first, cell.first);
+        ASSERT_TRUE(found.there);
+        ASSERT_EQ(found.color, index) << "height " << cell.first;
+      }
+      // No other voxels: all places of small grids, neighbours in the large one.
+      const uint64_t end = dag->voxels == 0 ? 64 : uint64_t{1} << 3 * std::min(c.height, 7);
+      for (uint64_t place = 0; place < end; ++place)
+        ASSERT_EQ(find_voxel(view, place).there, order.index.count(place) == 1) << place;
+      for (const SurfaceVoxel& v : c.voxels)
+        if (c.height > 7) {
+          ASSERT_EQ(find_voxel(view, v.place ^ 1).there, order.index.count(v.place ^ 1) == 1);
+        }
+    }
 }
 
 TEST(Dag, EqualSubtreesAreStoredOnce) {
-  const auto dag = build(cases()[4].voxels, 4, Colors::leaf, Counts::node);
+  const auto dag = build(cases()[4].voxels, 4);
   ASSERT_TRUE(dag);
   EXPECT_EQ(dag->leaves.size(), 1);
   EXPECT_EQ(dag->nodes[3].size(), 9);
@@ -115,7 +178,7 @@ TEST(Dag, LargeCountsGetWordsOfTheirOwn) {
   MemoryBudget memory;
   Context ctx;
   ctx.memory = &memory;
-  DagBuilder builder(9, Colors::leaf, Counts::node, ctx);
+  DagBuilder builder(9, ctx);
   Voxels run(1 << 16);
   for (uint64_t first = 0; first < 1 << 24; first += run.size()) {
     for (size_t i = 0; i < run.size(); ++i) run[i].place = first + i;
@@ -136,8 +199,7 @@ TEST(Dag, LargeCountsGetWordsOfTheirOwn) {
 
 TEST(Dag, RunsDoNotMatter) {
   const Voxels voxels = scattered(10, 5000, 3);
-  const auto a = build(voxels, 10, Colors::all, Counts::node, 1),
-             b = build(voxels, 10, Colors::all, Counts::node, 777);
+  const auto a = build(voxels, 10, 1), b = build(voxels, 10, 777);
   ASSERT_TRUE(a && b);
   EXPECT_EQ(a->nodes, b->nodes);
   EXPECT_EQ(a->leaves, b->leaves);
@@ -145,7 +207,7 @@ TEST(Dag, RunsDoNotMatter) {
 
 TEST(Dag, VoxelsOutOfOrderAreRefused) {
   for (const Voxels& voxels : {Voxels{{7, {}}, {7, {}}}, Voxels{{7, {}}, {6, {}}}, Voxels{{1 << 15, {}}}}) {
-    const auto dag = build(voxels, 5, Colors::leaf, Counts::node);
+    const auto dag = build(voxels, 5);
     ASSERT_FALSE(dag);
     EXPECT_EQ(dag.error().code, ErrorCode::internal);
   }
@@ -155,15 +217,27 @@ TEST(Dag, MemoryIsLimited) {
   MemoryBudget memory(1 << 16);
   Context ctx;
   ctx.memory = &memory;
-  DagBuilder builder(12, Colors::leaf, Counts::node, ctx);
+  DagBuilder builder(12, ctx);
   const Status status = builder.add(scattered(12, 20000, 4));
   ASSERT_FALSE(status);
   EXPECT_EQ(status.error().code, ErrorCode::limit);
 }
 
+TEST(Dag, CountsInNodesDoNotDependOnTheCurve) {
+  const Voxels voxels = scattered(8, 5000, 3);
+  const auto a = build(voxels, 8, Colors::all, Counts::node, Curve::morton),
+             b = build(voxels, 8, Colors::all, Counts::node, Curve::hilbert);
+  ASSERT_TRUE(a && b);
+  EXPECT_EQ(a->nodes, b->nodes);
+  const auto plain = build(voxels, 8), leaf = build(voxels, 8, Colors::leaf, Counts::node, Curve::hilbert);
+  ASSERT_TRUE(plain && leaf);
+  EXPECT_EQ(plain->nodes, leaf->nodes);
+  EXPECT_EQ(plain->leaves, leaf->leaves);
+}
+
 TEST(Dag, DamagedWordsLeadNowhere) {
   const Voxels voxels = scattered(8, 2000, 5);
-  auto dag = build(voxels, 8, Colors::leaf, Counts::node);
+  auto dag = build(voxels, 8);
   ASSERT_TRUE(dag);
   std::mt19937_64 random(6);
   for (int round = 0; round < 300; ++round) {

@@ -29,6 +29,8 @@ const std::vector<Bytes>& files() {
           options.counts = counts;
           options.colors = colors;
           if (colors == Colors::all) options.threshold = 3;
+          if ((counts == Counts::pointer) == (codec == ColorCodec::raw || codec == ColorCodec::vws))
+            options.curve = Curve::hilbert;
           if (counts == Counts::pointer) {
             options.image_curve = ImageCurve::hilbert;
             options.quality = 40;

@@ -81,8 +81,10 @@ TEST(ColorVolume, EveryVoxelComesBack) {
         options.codec = codec;
         options.counts = counts;
         options.colors = colors;
+        if (counts == Counts::pointer) options.image_curve = ImageCurve::hilbert;
+        if ((counts == Counts::pointer) == (codec == ColorCodec::raw || codec == ColorCodec::vws))
+          options.curve = Curve::hilbert;
         if (counts == Counts::pointer) {
-          options.image_curve = ImageCurve::hilbert;
           options.quality = colors == Colors::leaf ? 0 : 60;
         }
         ListSource source(voxels, dims);
@@ -162,9 +164,10 @@ TEST(ColorVolume, EveryVoxelComesBack) {
 }
 
 /// The colour of each node is the mean of its voxels in linear light.
-TEST(ColorVolume, NodesHaveTheMeanOfTheirVoxels) {
+void nodes_have_the_mean_of_their_voxels(Curve curve) {
   const Voxels voxels = scattered(5, 2000, 11);
   Options options;
+  options.curve = curve;
   options.codec = ColorCodec::raw;
   options.colors = Colors::all;
   ListSource source(voxels, Index3(32));
@@ -173,7 +176,7 @@ TEST(ColorVolume, NodesHaveTheMeanOfTheirVoxels) {
   ASSERT_TRUE(volume);
   // The cells in the order of a walk, with their voxels.
   uint64_t number = 0;
-  const std::function<void(int, uint64_t)> walk = [&](int h, uint64_t cell) {
+  const std::function<void(int, uint64_t, OrderState)> walk = [&](int h, uint64_t cell, OrderState state) {
     double light[3] = {}, count = 0;
     for (const SurfaceVoxel& v : voxels) {
       if (v.place >> 3 * h != cell) continue;
@@ -193,10 +196,16 @@ TEST(ColorVolume, NodesHaveTheMeanOfTheirVoxels) {
       EXPECT_NEAR(channels[k], 255 * (l <= 0.0031308 ? 12.92 * l : 1.055 * std::pow(l, 1 / 2.4) - 0.055),
                   0.6);
     }
-    for (uint64_t octant = 0; h > 0 && octant < 8; ++octant) walk(h - 1, cell << 3 | octant);
+    for (int i = 0; h > 0 && i < 8; ++i) {
+      const uint64_t octant = octant_orders.octant[state][static_cast<size_t>(i)];
+      walk(h - 1, cell << 3 | octant, octant_orders.next[state][octant]);
+    }
   };
-  walk(5, 0);
+  walk(5, 0, first_state(curve));
   EXPECT_EQ(number, (*volume)->params().color_count);
+}
+TEST(ColorVolume, NodesHaveTheMeanOfTheirVoxels) {
+  for (const Curve curve : {Curve::morton, Curve::hilbert}) nodes_have_the_mean_of_their_voxels(curve);
 }
 
 TEST(ColorVolume, ThreadsAndRunsDoNotMatter) {

@@ -20,6 +20,21 @@ CODECS = {1: "raw", 2: "fws", 3: "vws", 4: "bc1", 5: "astc", 6: "bc7"}
 VOXELS, ALL = 1, 2
 IN_NODES, BESIDE = 1, 2
 WIDE = (1 << 24) - 1
+HILBERT = [[tuple(map(int, pair.split(":"))) for pair in way.split()] for way in """
+0:1 2:2 6:2 4:9 5:9 7:8 3:8 1:4
+0:2 4:0 5:0 1:7 3:7 7:3 6:3 2:11
+0:0 1:1 3:1 2:5 6:5 7:10 5:10 4:6
+3:4 1:5 5:5 7:6 6:6 4:11 0:11 2:1
+3:5 7:3 6:3 2:10 0:10 4:0 5:0 1:8
+3:3 2:4 0:4 1:2 5:2 4:7 6:7 7:9
+5:7 7:8 3:8 1:3 0:3 2:2 6:2 4:10
+5:8 1:6 0:6 4:1 6:1 2:9 3:9 7:5
+5:6 4:7 6:7 7:11 3:11 2:4 0:4 1:0
+6:10 4:11 0:11 2:0 3:0 1:5 5:5 7:7
+6:11 2:9 3:9 7:4 5:4 1:6 0:6 4:2
+6:9 7:10 5:10 4:8 0:8 1:1 3:1 2:3
+""".strip().split("\n")]
+MORTON = [(octant, 0) for octant in range(8)]
 PART, MACRO = 1 << 20, 1 << 14
 MOST_VOXELS = 1 << 27
 
@@ -46,7 +61,8 @@ class Surface:
         require(self.has_color in (VOXELS, ALL), "chunk DAGP: byte 1: {}", self.has_color)
         require(self.counts in (IN_NODES, BESIDE), "chunk DAGP: byte 2: {}", self.counts)
         require(self.endpoints in (1, 2), "chunk DAGP: byte 3: {}", self.endpoints)
-        require(curve == 1, "chunk DAGP: byte 6: {}", curve)
+        require(curve in (1, 2), "chunk DAGP: byte 6: {}", curve)
+        self.hilbert = curve == 2
         require(CODECS[self.codec] != "bc1" or self.image_curve in (1, 2), "chunk DAGP: byte 7: {}", self.image_curve)
         require(CODECS[self.codec] not in ("astc", "bc7"), "chunk DAGP: byte 0: {} is not supported by this decoder",
                 CODECS[self.codec])
@@ -84,19 +100,25 @@ class Surface:
         """(x, y, z, number of its colour) of all voxels: by counting, not by the file's counts."""
         number = 0
 
-        def cell(h, pointer, x, y, z):
+        def ordered(way):
+            return HILBERT[way] if self.hilbert else MORTON
+
+        def cell(h, pointer, x, y, z, way):
             nonlocal number
             if h == 2:
                 require(pointer < len(self.leaves), "chunk LEAF: no word {}", pointer)
-                yield from inside(2, self.leaves[pointer], x, y, z)
+                yield from inside(2, self.leaves[pointer], x, y, z, way)
                 return
             if self.has_color == ALL:
                 number += 1
             half = 1 << h - 1
-            for octant, child in self.children(h, pointer):
-                yield from cell(h - 1, child, x + half * (octant & 1), y + half * (octant >> 1 & 1), z + half * (octant >> 2))
+            children = dict(self.children(h, pointer))
+            for octant, next_way in ordered(way):
+                if octant in children:
+                    yield from cell(h - 1, children[octant], x + half * (octant & 1), y + half * (octant >> 1 & 1),
+                                    z + half * (octant >> 2), next_way)
 
-        def inside(h, bits, x, y, z):
+        def inside(h, bits, x, y, z, way):
             nonlocal number
             if bits == 0:
                 return
@@ -105,12 +127,12 @@ class Surface:
                 yield x, y, z, number - 1
                 return
             width, half = 8 ** (h - 1), 1 << h - 1
-            for octant in range(8):
+            for octant, next_way in ordered(way):
                 yield from inside(h - 1, bits >> octant * width & (1 << width) - 1, x + half * (octant & 1),
-                                  y + half * (octant >> 1 & 1), z + half * (octant >> 2))
+                                  y + half * (octant >> 1 & 1), z + half * (octant >> 2), next_way)
 
         if self.voxels:
-            yield from cell(self.height, self.root, 0, 0, 0)
+            yield from cell(self.height, self.root, 0, 0, 0, 0)
         self.counted = number
 
     # Section 4.5

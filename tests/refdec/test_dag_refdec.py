@@ -53,7 +53,7 @@ class SmallFile(unittest.TestCase):
     def test_broken_rules(self):
         for chunk, layout, offset, value in (
                 ("dagp", "<B", 0, 5), ("dagp", "<B", 0, 6), ("dagp", "<B", 0, 8), ("dagp", "<B", 1, 3), ("dagp", "<B", 2, 0), ("dagp", "<B", 3, 3),
-                ("dagp", "<B", 4, 4), ("dagp", "<B", 6, 2), ("dagp", "<Q", 8, 11), ("dagp", "<Q", 16, 11),
+                ("dagp", "<B", 4, 4), ("dagp", "<B", 6, 3), ("dagp", "<Q", 8, 11), ("dagp", "<Q", 16, 11),
                 ("dagp", "<Q", 8, 9), ("dagp", "<I", 24, 3), ("node", "<I", 4, 2), ("node", "<I", 0, 0b111),
                 ("colr", "<I", 0, 4), ("colr", "<Q", 8, 1), ("colr", "<Q", 16, 1), ("colr", "<I", 32, 0),
                 ("colr", "<I", 32, 1 | 1 << 16)):
@@ -86,7 +86,8 @@ class Tools(ToolCase):
     def test_built_ins(self):
         for options in (("--codec", "raw"), ("--codec", "fws"), ("--codec", "vws"), ("--codec", "bc1"),
                         ("--codec", "bc1", "--image-curve", "hilbert", "--colors", "all"), ("-e", "2"), ("-e", "25.5", "--effort", "1"),
-                        ("--colors", "all"), ("--counts", "pointer"), ("--colors", "all", "--counts", "pointer")):
+                        ("--colors", "all"), ("--counts", "pointer"), ("--colors", "all", "--counts", "pointer"),
+                        ("--curve", "hilbert"), ("--curve", "hilbert", "--counts", "pointer", "--colors", "all")):
             with self.subTest(options=options):
                 self.compare(self.encode("menger:3", *options))
 
@@ -99,7 +100,8 @@ class Tools(ToolCase):
                 data += bytes((noise.randrange(256), noise.randrange(256), noise.randrange(256), 255)
                               if noise.random() < share else 4)
             write(self.path("in.raw"), data)
-            for options in ((), ("-e", "1"), ("--colors", "all"), ("--codec", "bc1")):
+            for options in ((), ("-e", "1"), ("--colors", "all"), ("--codec", "bc1"),
+                            ("--curve", "hilbert", "--colors", "all")):
                 with self.subTest(dims=dims, options=options):
                     self.compare(self.encode(self.path("in.raw"), "--dims", "%d,%d,%d" % dims, "--type", "rgba8", *options))
 

@@ -14,6 +14,9 @@ std::string_view name(color::ColorCodec codec) {
 std::string_view name(color::ImageCurve curve) {
   return curve == color::ImageCurve::morton ? "morton" : "hilbert";
 }
+std::string_view name(color::Curve curve) {
+  return curve == color::Curve::morton ? "morton" : "hilbert";
+}
 
 Json params_json(const color::Params& p) {
   Json json = Json::object();
@@ -27,6 +30,7 @@ Json params_json(const color::Params& p) {
     json.set("image_curve", name(p.image_curve));
     json.set("block", fmt::format("{}x{}", p.block_size.width, p.block_size.height));
   }
+  json.set("curve", name(p.curve));
   json.set("colors", p.colors == color::Colors::leaf ? "leaf" : "all");
   json.set("counts", p.counts == color::Counts::node ? "node" : "pointer");
   return json;
