@@ -1,6 +1,5 @@
 // bench_vq_speed: how fast VQ files are decoded and looked into, with one thread.
 #include <fmt/core.h>
-#include <time.h>
 
 #include <algorithm>
 #include <vector>
@@ -8,6 +7,7 @@
 #include "formats/copy.h"
 #include "formats/hash.h"
 #include "libvq/store.h"
+#include "tests/bench/thread_time.h"
 #include "tools/common/input.h"
 #include "tools/common/json.h"
 #include "tools/common/main.h"
@@ -30,25 +30,6 @@ void declare(cli::CommandLine& line, Options& o) {
   line.option("--rounds", "N", "Repetitions, of which the fastest counts (3)",
               cli::integer(o.rounds, 1, 1000));
   cli::declare_input_options(line, o.open);
-}
-
-/// Seconds that this thread has run: what other programs take of its core is left out.
-double cpu_seconds() {
-  timespec now{};
-  clock_gettime(CLOCK_THREAD_CPUTIME_ID, &now);
-  return static_cast<double>(now.tv_sec) + static_cast<double>(now.tv_nsec) * 1e-9;
-}
-
-/// Seconds of the fastest of some rounds.
-template <class Body>
-Result<double> fastest(int64_t rounds, Body body) {
-  double best = 1e300;
-  for (int64_t i = 0; i < rounds; ++i) {
-    const double start = cpu_seconds();
-    VOX_CHECK(body());
-    best = std::min(best, cpu_seconds() - start);
-  }
-  return best;
 }
 
 Result<std::shared_ptr<const vq::Volume>> encode(const Options& o, const vq::Options& options, Context& ctx) {
