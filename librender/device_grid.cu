@@ -1,10 +1,13 @@
 // Casting on a GPU: the kernel of cast_kernel.h over a launch grid.
+#include <algorithm>
 #include <vector>
 
+#include "libcolor/store.h"
 #include "librender/cast_params.h"
 #include "librender/device_grid.h"
 #include "librender/device_memory.h"
 #include "librender/flat_pools.h"
+#include "librender/surface_colors.h"
 
 namespace voxkit::render {
 namespace {
@@ -57,7 +60,7 @@ class DeviceDense final : public DeviceGrid {
   DenseView view{};
   DeviceArray<std::byte> voxels;
 
-  Status cast(const Camera& camera, const CastOptions& options, Frame& frame) const override {
+  Status cast(const Camera& camera, const CastOptions& options, Frame& frame, Context&) const override {
     if (options.traversal == Traversal::baseline)
       return launch(BaselineView{view}, info, camera, options, frame);
     return launch(view, info, camera, options, frame);
@@ -71,7 +74,7 @@ class DeviceSvmm final : public DeviceGrid {
   DeviceArray<svmm::View> view;
   DeviceArray<svmm::FlatPools> pools;
 
-  Status cast(const Camera& camera, const CastOptions& options, Frame& frame) const override {
+  Status cast(const Camera& camera, const CastOptions& options, Frame& frame, Context&) const override {
     using svmm::FlatPools;
     switch (options.traversal) {
       case Traversal::path:
@@ -85,6 +88,37 @@ class DeviceSvmm final : public DeviceGrid {
     }
   }
 };
+
+class DeviceDag final : public DeviceGrid {
+ public:
+  explicit DeviceDag(const DagGrid& dag) : grid(dag) {}
+  DagGrid grid;
+  DeviceArray<uint64_t> leaves;
+  std::vector<DeviceArray<uint32_t>> nodes;
+  DeviceArray<color::DagView> view;
+
+  Status cast(const Camera& camera, const CastOptions& options, Frame& frame, Context& ctx) const override {
+    if (options.traversal == Traversal::baseline) return only_dense_has_baseline();
+    CastOptions detailed = options;
+    detailed.details = true;  // where to look colours up
+    if (options.traversal == Traversal::restart)
+      VOX_CHECK(launch(DagCastView<Search::restart>{view.data()}, grid.info(), camera, detailed, frame));
+    else
+      VOX_CHECK(launch(DagCastView<Search::path>{view.data()}, grid.info(), camera, detailed, frame));
+    VOX_CHECK(look_up_colors(grid.volume(), frame, ctx));
+    if (!options.details) frame.details.clear();
+    return {};
+  }
+};
+
+/// `count` words on the device.
+template <class Word>
+Result<DeviceArray<Word>> uploaded(const Word* words, uint64_t count) {
+  VOX_TRY(auto array, DeviceArray<Word>::allocate(std::max<uint64_t>(1, count)));
+  VOX_CHECK(
+      check(cudaMemcpy(array.data(), words, count * sizeof(Word), cudaMemcpyHostToDevice), "uploading"));
+  return array;
+}
 
 }  // namespace
 
@@ -129,6 +163,24 @@ Result<std::unique_ptr<const DeviceGrid>> DeviceGrid::upload(const SvmmGrid& gri
   VOX_TRY(const svmm::FlatPools pools, flatten(grid.volume(), allocate, copy));
   VOX_TRY(device->pools, DeviceArray<svmm::FlatPools>::copy_of(pools));
   VOX_TRY(device->view, DeviceArray<svmm::View>::copy_of(grid.volume().store().view));
+  return std::unique_ptr<const DeviceGrid>(std::move(device));
+}
+
+Result<std::unique_ptr<const DeviceGrid>> DeviceGrid::upload(const DagGrid& grid, Context&) {
+  VOX_CHECK(check_device());
+  const color::Volume& volume = grid.volume();
+  VOX_TRY(const color::DagView* const dag, volume.store().dag(volume.container(), volume.params()));
+  auto device = std::make_unique<DeviceDag>(grid);
+  color::DagView view = *dag;
+  VOX_TRY(device->leaves, uploaded(dag->leaves, dag->leaf_count));
+  view.leaves = device->leaves.data();
+  for (size_t h = 0; h < view.nodes.size(); ++h) {
+    if (view.words[h] == 0) continue;
+    VOX_TRY(auto nodes, uploaded(dag->nodes[h], dag->words[h]));
+    view.nodes[h] = nodes.data();
+    device->nodes.push_back(std::move(nodes));
+  }
+  VOX_TRY(device->view, DeviceArray<color::DagView>::copy_of(view));
   return std::unique_ptr<const DeviceGrid>(std::move(device));
 }
 

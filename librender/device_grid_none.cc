@@ -15,5 +15,9 @@ Result<std::unique_ptr<const DeviceGrid>> DeviceGrid::upload(const SvmmGrid&, Co
   VOX_CHECK(check_device());
   return nullptr;
 }
+Result<std::unique_ptr<const DeviceGrid>> DeviceGrid::upload(const DagGrid&, Context&) {
+  VOX_CHECK(check_device());
+  return nullptr;
+}
 
 }  // namespace voxkit::render

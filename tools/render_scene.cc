@@ -43,7 +43,7 @@ Status Scene::draw(const Camera& camera, CastOptions options, const DvrOptions& 
   if (device_dvr) return device_dvr->draw(camera, dvr_options, frame, ctx);
   if (dvr) return dvr->draw(camera, dvr_options, frame, ctx);
   options.range = range;
-  if (device) return device->cast(camera, options, frame);
+  if (device) return device->cast(camera, options, frame, ctx);
   if (dag) return cast(*dag, camera, options, frame, ctx);
   return compressed ? cast(*compressed, camera, options, frame, ctx)
                     : cast(*dense, camera, options, frame, ctx);
@@ -73,7 +73,6 @@ Result<Scene> open_scene(const std::string& name, const SceneOptions& o, Run& ru
   if (input.svmm) {
     scene.compressed.emplace(input.svmm);
   } else if (input.color) {
-    if (o.cuda) return fail(ErrorCode::usage, name, "--device cuda: not of a .dagc file: use cpu");
     scene.dag.emplace(input.color);
   } else {
     run.stage("read");
@@ -81,8 +80,10 @@ Result<Scene> open_scene(const std::string& name, const SceneOptions& o, Run& ru
   }
   if (o.cuda) {
     run.stage("upload");
-    VOX_TRY(scene.device, scene.compressed ? DeviceGrid::upload(*scene.compressed, run.ctx)
-                                           : DeviceGrid::upload(*scene.dense, run.ctx));
+    const auto upload = [&](const auto& grid) { return DeviceGrid::upload(grid, run.ctx); };
+    VOX_TRY(scene.device, scene.compressed ? upload(*scene.compressed)
+                          : scene.dag      ? upload(*scene.dag)
+                                           : upload(*scene.dense));
   }
   return scene;
 }

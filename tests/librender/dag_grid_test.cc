@@ -1,11 +1,15 @@
 // Compressed surfaces: the picture of the DAG is that of its voxels, one by one, bit by bit.
 #include <gtest/gtest.h>
 
+#include <cstring>
+
 #include "libcolor/color.h"
 #include "libcolor/store.h"
 #include "librender/camera.h"
 #include "librender/ray_cast.h"
+#include "librender/surface_colors.h"
 #include "tests/libcolor/scenes.h"
+#include "tests/librender/emulated_launch.h"
 
 namespace voxkit::render {
 namespace {
@@ -77,6 +81,16 @@ TEST(DagGrid, PicturesAreThoseOfTheVoxels) {
               }
             }
           options.traversal = Traversal::path;
+          // The kernel of the GPU, and colours looked up after it.
+          const auto view = (*volume)->store().dag((*volume)->container(), (*volume)->params());
+          ASSERT_TRUE(view);
+          Frame device = launch(DagCastView<Search::path>{*view}, grid.info(), camera, options);
+          ASSERT_TRUE(look_up_colors(**volume, device, f.ctx));
+          EXPECT_EQ(device.rays_hit, expected.rays_hit);
+          for (size_t i = 0; i < frame.pixels.size(); ++i) {
+            ASSERT_EQ(std::memcmp(&device.pixels[i], &expected.pixels[i], sizeof(Pixel)), 0);
+            ASSERT_EQ(std::memcmp(&device.details[i].voxel, &expected.details[i].voxel, 12), 0);
+          }
         }
     }
 }
