@@ -197,6 +197,36 @@ TEST(Dag, LargeCountsGetWordsOfTheirOwn) {
   EXPECT_EQ(dag->nodes[7].size(), 9 + 2);
 }
 
+TEST(Dag, NumbersUpToTwoToThe63) {
+  // Every voxel of a cube of 2^21 a side is there, and then all but one octant of the root.
+  MemoryBudget memory;
+  Context ctx;
+  ctx.memory = &memory;
+  DagPool pool(21, Colors::leaf, Counts::node, Curve::morton, ctx);
+  Subtree full = *pool.add_leaf(~uint64_t{0}), root;
+  for (int h = 3; h <= 21; ++h) {
+    Octants octants;
+    for (uint32_t octant = 0; octant < 8; ++octant)
+      if (h < 21 || octant != 2) octants.add(octant, full);
+    full = root = *pool.add_node(h, octants, morton_state);
+  }
+  const uint64_t eighth = uint64_t{1} << 60;
+  EXPECT_EQ(root.colors, 7 * eighth);
+  const Dag dag = pool.finish(root, root.colors);
+  const uint64_t last = (uint64_t{1} << 63) - 1;
+  EXPECT_EQ(find_voxel(view_of(dag), last).color, 7 * eighth - 1);
+  EXPECT_EQ(find_voxel(view_of(dag), uint64_t{1} << 31).color, uint64_t{1} << 31);
+  EXPECT_FALSE(find_voxel(view_of(dag), 2 * eighth + 5).there);
+  Dag hilbert = dag;
+  hilbert.curve = Curve::hilbert;  // which begins in octant 0 and goes on to 2, 6, 4, 5, 7, 3 and 1
+  EXPECT_EQ(find_voxel(view_of(hilbert), 0).color, 0u);
+  EXPECT_EQ(find_voxel(view_of(hilbert), morton_code((1u << 21) - 1, 0, 0)).color, 7 * eighth - 1);
+  // Counts beside pointers have 32 bits.
+  const auto beside = recount(dag, Colors::leaf, Counts::pointer, Curve::morton, ctx);
+  ASSERT_FALSE(beside);
+  EXPECT_EQ(beside.error().code, ErrorCode::limit);
+}
+
 TEST(Dag, RunsDoNotMatter) {
   const Voxels voxels = scattered(10, 5000, 3);
   const auto a = build(voxels, 10, 1), b = build(voxels, 10, 777);
