@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cmath>
 
+#include "libcolor/bit_writer.h"
 #include "libcolor/block_plan.h"
 
 namespace voxkit::color {
@@ -11,26 +12,6 @@ namespace {
 uint32_t to_565(Rgb c) {
   return c.r >> 3 | static_cast<uint32_t>(c.g >> 2) << 5 | static_cast<uint32_t>(c.b >> 3) << 11;
 }
-
-/// Bits, lowest first.
-class BitWriter {
- public:
-  void add(uint32_t value, int bits) {
-    pending_ |= uint64_t{value} << count_;
-    for (count_ += bits; count_ >= 8; count_ -= 8, pending_ >>= 8)
-      bytes_.push_back(static_cast<std::byte>(pending_ & 0xff));
-  }
-  void align() {
-    if (count_ > 0) add(0, 8 - count_);
-  }
-  uint64_t size() const { return bytes_.size() * 8 + static_cast<uint64_t>(count_); }
-  const std::vector<std::byte>& bytes() const { return bytes_; }
-
- private:
-  std::vector<std::byte> bytes_;
-  uint64_t pending_ = 0;
-  int count_ = 0;
-};
 
 /// A part as it grows, macro block by macro block.
 class PartWriter {

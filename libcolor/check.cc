@@ -8,6 +8,7 @@
 #include "formats/parallel.h"
 #include "formats/reservation.h"
 #include "libcolor/morton.h"
+#include "libcolor/palette_check.h"
 #include "libcolor/store.h"
 
 namespace voxkit::color {
@@ -33,8 +34,10 @@ class Checker {
     const auto parts = static_cast<int64_t>(part_count(params_.color_count));
     if (params_.codec == ColorCodec::raw) return {};
     return parallel_for(ctx_, parts, [&](int64_t part) {
-      return makes_textures(params_.codec) ? check_textures(static_cast<uint64_t>(part))
-                                           : check_part(static_cast<uint64_t>(part));
+      const auto number = static_cast<uint64_t>(part);
+      return makes_textures(params_.codec)          ? check_textures(number)
+             : params_.codec == ColorCodec::palette ? check_palettes(number)
+                                                    : check_part(number);
     });
   }
 
@@ -164,6 +167,17 @@ class Checker {
     const uint32_t invalid = reader.first_invalid();
     if (invalid == reader.blocks()) return {};
     return bad(fmt::format("chunk COLR 0.{}: block {}: not a valid one", part, invalid));
+  }
+
+  Status check_palettes(uint64_t part) const {
+    const std::byte* const bytes = volume_.store().part(part, volume_.container());
+    if (bytes == nullptr) return volume_.store().status();
+    const std::string wrong = check_palette_part(
+        PaletteView(bytes, volume_.store().part_bytes(part), colors_of_part(params_.color_count, part),
+                    palette_bits(params_.palette_colors)),
+        params_.palette_colors);
+    if (wrong.empty()) return {};
+    return bad(fmt::format("chunk COLR 0.{}: {}", part, wrong));
   }
 
   Status check_part(uint64_t part) const {

@@ -21,12 +21,13 @@ class Store;
 
 /// How colours are stored. Numbers are part of FORMAT.md.
 enum class ColorCodec : uint8_t {
-  raw = 1,   ///< 24 bits each
-  fws = 2,   ///< variable bitrate blocks, weights of fixed size (section 4.2)
-  vws = 3,   ///< the same, weights of variable size (section 4.3)
-  bc1 = 4,   ///< an image of them, in blocks of 16 (section 4.1): 4 bits each
-  astc = 5,  ///< the same, blocks of 16 bytes for 16 to 144 colours; not in every build
-  bc7 = 6,   ///< the same, blocks of 16 bytes for 16 colours: 8 bits each
+  raw = 1,      ///< 24 bits each
+  fws = 2,      ///< variable bitrate blocks, weights of fixed size (section 4.2)
+  vws = 3,      ///< the same, weights of variable size (section 4.3)
+  bc1 = 4,      ///< an image of them, in blocks of 16 (section 4.1): 4 bits each
+  astc = 5,     ///< the same, blocks of 16 bytes for 16 to 144 colours; not in every build
+  bc7 = 6,      ///< the same, blocks of 16 bytes for 16 colours: 8 bits each
+  palette = 7,  ///< indices into palettes of blocks, of a palette of the scene (Dado et al. 2016)
 };
 
 /// Whether a codec keeps within a threshold.
@@ -39,13 +40,16 @@ constexpr bool makes_textures(ColorCodec codec) {
   return codec == ColorCodec::bc1 || codec == ColorCodec::astc || codec == ColorCodec::bc7;
 }
 
+inline constexpr uint32_t most_palette_colors = 1 << 16;
+
 /// What an encoder is asked for.
 struct Options {
   ColorCodec codec = ColorCodec::vws;
   double threshold = 9.56;  ///< of fws and vws: greatest distance of a decoded colour, in RGB of 0 to 255
   int weight_bits = 3;      ///< of fws: 1 to 4
   int effort = 3;           ///< of fws and vws: 1: the paper's greedy merging; up to 9: smaller, slower; of
-                            ///< textures: up to 9: nearer, slower
+                            ///< textures: up to 9: nearer, slower; of palette: both
+  uint32_t palette = 256;   ///< of palette: colours of the scene's, at most; 1 to 2^16
   ImageCurve image_curve = ImageCurve::morton;  ///< of textures
   int quality = 100;                            ///< of astc: 100: blocks of 4 x 4; down to 0: of 12 x 12
   Colors colors = Colors::leaf;
@@ -67,6 +71,7 @@ struct Params {
   BlockSize block_size;                         ///< of textures
   int height = leaf_height;                     ///< the grid is 2^height voxels a side
   uint32_t root = 0;
+  uint32_t palette_colors = 0;  ///< of palette: of the scene's
   uint64_t leaf_voxels = 0, color_count = 0;
   // For the reader's information.
   int weight_bits = 0;
@@ -90,8 +95,8 @@ struct Report {
 Status validate(const Options& options);
 
 /// Compresses `source` into a container written to `sink`, in one pass. Memory: the DAG and some parts of
-/// colours; with Colors::all or along a Hilbert curve, all colours, twice. What is written does not depend on
-/// ctx.threads.
+/// colours; with Colors::all or along a Hilbert curve, all colours, twice; with palette, all colours. What is
+/// written does not depend on ctx.threads.
 Result<Report> encode(SurfaceSource& source, const Options& options, const ByteSink& sink, Context& ctx);
 
 /// A compressed surface, opened for random access. Safe on any bytes: every operation returns an error or a

@@ -12,6 +12,7 @@
 #include "libcolor/dag_builder.h"
 #include "libcolor/dag_recount.h"
 #include "libcolor/layout.h"
+#include "libcolor/palette_encode.h"
 #include "libcolor/texture.h"
 
 namespace voxkit::color {
@@ -39,6 +40,12 @@ class ColorWriter {
   Status add(Rgb color) {
     colors_.push_back(color);
     return colors_.size() == batch_ << part_log2 ? flush() : Status();
+  }
+  /// Writes the palette that colours are coded with, before the first of them.
+  Status use(const Palette& palette) {
+    palette_ = &palette;
+    bytes += palette.colors().size_bytes();
+    return container_.add(palette_kind, 0, 0, std::as_bytes(palette.colors()));
   }
   /// Encodes what is left.
   Status finish() { return flush(); }
@@ -71,6 +78,7 @@ class ColorWriter {
   }
   EncodedPart encode(std::span<const Rgb> colors) const {
     if (makes_textures(options_.codec)) return encode_texture(colors, options_);
+    if (palette_ != nullptr) return encode_palette_part(colors, *palette_, options_.effort);
     if (options_.codec != ColorCodec::raw)
       return encode_part(colors,
                          {options_.threshold, options_.codec == ColorCodec::fws ? options_.weight_bits : 0,
@@ -86,10 +94,21 @@ class ColorWriter {
   ContainerWriter& container_;
   Context& ctx_;
   Reservation reservation_;
+  const Palette* palette_ = nullptr;
   std::vector<Rgb> colors_;
   size_t batch_ = 0;
   uint64_t next_part_ = 0;
 };
+
+/// Room for more colours, ahead of need: counted, and so is the copy while they move.
+Status make_room(std::vector<Rgb>& held, size_t more, Reservation& reservation) {
+  if (held.capacity() - held.size() >= more) return {};
+  const size_t before = held.capacity(), room = std::max(held.size() + more, before + before / 2);
+  VOX_CHECK(reservation.add(room * sizeof(Rgb), "room for all colors"));
+  held.reserve(room);
+  reservation.release(before * sizeof(Rgb));
+  return {};
+}
 
 }  // namespace
 
@@ -103,6 +122,8 @@ Status validate(const Options& o) {
     return bad_usage(fmt::format("{} bits a weight: expected 1 to {}", o.weight_bits, most_weight_bits));
   if (o.quality < 0 || o.quality > 100)
     return bad_usage(fmt::format("quality {}: expected 0 to 100", o.quality));
+  if (o.palette < 1 || o.palette > most_palette_colors)
+    return bad_usage(fmt::format("a palette of {} colors: expected 1 to {}", o.palette, most_palette_colors));
   VOX_CHECK(texture_support(o.codec));
   if (o.effort < 1 || o.effort > 9) return bad_usage(fmt::format("effort {}: expected 1 to 9", o.effort));
   return {};
@@ -122,12 +143,14 @@ Result<Report> encode(SurfaceSource& source, const Options& options, const ByteS
   VOX_CHECK(colors.begin());
   DagBuilder builder(height, ctx);
   const bool all = options.colors == Colors::all, reorder = all || options.curve != Curve::morton;
-  std::vector<Rgb> held;  // until the nodes above are known
+  // Until the nodes above, or the palette, are known.
+  const bool hold = reorder || options.codec == ColorCodec::palette;
+  std::vector<Rgb> held;
   Reservation reservation(*ctx.memory);
   VOX_CHECK(source.read(ctx, [&](std::span<const SurfaceVoxel> run) -> Status {
     VOX_CHECK(builder.add(run));
-    if (reorder) {
-      VOX_CHECK(reservation.add(run.size() * sizeof(Rgb), "room for all colors"));
+    if (hold) {
+      VOX_CHECK(make_room(held, run.size(), reservation));
       for (const SurfaceVoxel& voxel : run) held.push_back(voxel.color);
     } else {
       for (const SurfaceVoxel& voxel : run) VOX_CHECK(colors.add(voxel.color));
@@ -143,11 +166,17 @@ Result<Report> encode(SurfaceSource& source, const Options& options, const ByteS
   }
   if (reorder) {
     const uint64_t count = other_counts ? recounted.color_count : dag.color_count;
-    VOX_TRY(const std::vector<Rgb> ordered,
-            colors_in_order(dag, count, options.colors, options.curve, held, reservation));
-    for (const Rgb color : ordered) VOX_CHECK(colors.add(color));
+    VOX_TRY(held, colors_in_order(dag, count, options.colors, options.curve, held, reservation));
   }
   if (other_counts) dag = std::move(recounted);
+  std::optional<Palette> palette;
+  if (options.codec == ColorCodec::palette) {
+    const auto quantise_start = Clock::now();
+    VOX_TRY(palette, Palette::choose(held, options.palette, options.effort, ctx));
+    VOX_CHECK(colors.use(*palette));
+    colors.seconds += seconds_since(quantise_start);
+  }
+  for (const Rgb color : held) VOX_CHECK(colors.add(color));
   VOX_CHECK(colors.finish());
 
   Report report;
@@ -170,13 +199,15 @@ Result<Report> encode(SurfaceSource& source, const Options& options, const ByteS
   p.dag_nodes = dag.node_count;
   p.color_bytes = colors.bytes;
   p.blocks = colors.blocks;
+  if (palette) p.palette_colors = static_cast<uint32_t>(palette->colors().size());
+  if (palette || has_threshold(options.codec))
+    p.macro_blocks = (dag.color_count + macro_block_colors - 1) / macro_block_colors;
   p.image_curve = options.image_curve;
   p.block_size = block_size_of(options);
   if (has_threshold(options.codec)) {
     p.endpoints = endpoints_for(options.threshold);
     p.threshold = options.threshold;
     p.weight_bits = options.codec == ColorCodec::fws ? options.weight_bits : 0;
-    p.macro_blocks = (dag.color_count + macro_block_colors - 1) / macro_block_colors;
   }
   if (dag.color_count > 0)
     p.grmse =

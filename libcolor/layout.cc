@@ -6,6 +6,7 @@
 #include <bit>
 
 #include "libcolor/astc.h"
+#include "libcolor/palette.h"
 #include "libcolor/texture.h"
 
 namespace voxkit::color {
@@ -37,6 +38,7 @@ std::vector<std::byte> pack_params(const Params& p) {
   store_le(&bytes[8], p.leaf_voxels);
   store_le(&bytes[16], p.color_count);
   store_le(&bytes[24], p.root);
+  store_le(&bytes[28], p.palette_colors);
   store_le(&bytes[32], p.threshold);
   store_le(&bytes[40], p.grmse);
   store_le(&bytes[48], p.dag_nodes);
@@ -62,7 +64,7 @@ Result<Params> unpack_params(std::span<const std::byte> bytes, const VolumeInfo&
     if (field(at) >= 1 && field(at) <= most) return {};
     return bad(at, fmt::format("unknown {} {}", what, field(at)));
   };
-  VOX_CHECK(is_one_of(0, 6, "color codec"));
+  VOX_CHECK(is_one_of(0, 7, "color codec"));
   VOX_CHECK(is_one_of(1, 2, "choice of colors"));
   VOX_CHECK(is_one_of(2, 2, "place of counts"));
   VOX_CHECK(is_one_of(3, 2, "kind of endpoints"));
@@ -98,6 +100,13 @@ Result<Params> unpack_params(std::span<const std::byte> bytes, const VolumeInfo&
   p.color_bytes = number(64);
   p.macro_blocks = number(72);
   p.blocks = number(80);
+  if (p.codec == ColorCodec::palette) {
+    p.palette_colors = load_le<uint32_t>(&bytes[28]);
+    if (p.palette_colors > most_palette_colors || (p.palette_colors == 0) != (p.color_count == 0))
+      return bad(28,
+                 fmt::format("a palette of {} colors: expected 1 to {}, or none where there are no colors",
+                             p.palette_colors, most_palette_colors));
+  }
   const int expected = height_of(info.dims);
   if (expected > most_levels)
     return bad_input(file, fmt::format("chunk VOLI, byte 0: a side above {}", 1 << most_levels));

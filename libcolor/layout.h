@@ -13,6 +13,7 @@ inline constexpr uint32_t params_kind = chunk_kind("DAGP");
 inline constexpr uint32_t leaves_kind = chunk_kind("LEAF");
 inline constexpr uint32_t nodes_kind = chunk_kind("NODE");  ///< index: the height
 inline constexpr uint32_t colors_kind = chunk_kind("COLR");
+inline constexpr uint32_t palette_kind = chunk_kind("PALT");
 
 /// Height of the smallest grid that holds a volume.
 int height_of(Index3 dims);

@@ -54,7 +54,7 @@ Status Store::find_chunks(const Container& container, const Params& params) {
     if (parts_[part] == none) return bad(fmt::format("no chunk COLR 0.{}", part));
     const uint64_t length = table[parts_[part]].length;
     const uint32_t colors = colors_of_part(params.color_count, part);
-    if (!has_threshold(params.codec)) {
+    if (params.codec == ColorCodec::raw || makes_textures(params.codec)) {
       const uint64_t expected =
           params.codec == ColorCodec::raw ? uint64_t{colors} * 3 : texture_bytes(params, colors);
       if (length != expected)
@@ -63,6 +63,17 @@ Status Store::find_chunks(const Container& container, const Params& params) {
     sizes_.push_back(length);
   }
   found_ = std::make_unique<std::atomic<const std::byte*>[]>(parts);
+  return find_palette(container, params);
+}
+
+Status Store::find_palette(const Container& container, const Params& params) {
+  if (params.codec != ColorCodec::palette) return {};
+  VOX_TRY(const auto bytes, container.only_chunk(palette_kind));
+  if (bytes.size() != uint64_t{params.palette_colors} * 3)
+    return bad_input(container.name(),
+                     fmt::format("chunk PALT has {} bytes: expected 3 for each of {} colors", bytes.size(),
+                                 params.palette_colors));
+  palette_ = {bytes.data(), params.palette_colors};
   return {};
 }
 
@@ -113,6 +124,10 @@ bool ColorReader::open(uint64_t part) {
   if (bytes_ == nullptr) return false;
   if (makes_textures(params_.codec))
     texture_.open(bytes_, params_, colors_of_part(params_.color_count, part));
+  if (params_.codec == ColorCodec::palette)
+    palette_.open(PaletteView(bytes_, store_.part_bytes(part), colors_of_part(params_.color_count, part),
+                              palette_bits(params_.palette_colors)),
+                  store_.palette());
   if (has_threshold(params_.codec))
     view_ = PartView(bytes_, store_.part_bytes(part), colors_of_part(params_.color_count, part),
                      params_.endpoints);

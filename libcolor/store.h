@@ -8,13 +8,14 @@
 
 #include "libcolor/dag_view.h"
 #include "libcolor/layout.h"
+#include "libcolor/palette_layout.h"
 #include "libcolor/texture.h"
 
 namespace voxkit::color {
 
 class Store {
  public:
-  /// Finds the chunks that follow from the parameters, and no others.
+  /// Finds the chunks that follow from the parameters, and no others; verifies the palette.
   Status find_chunks(const Container& container, const Params& params);
   /// The DAG, all of which is verified now.
   Result<const DagView*> dag(const Container& container, const Params& params) const;
@@ -24,16 +25,20 @@ class Store {
     return data != nullptr ? data : verify(number, container);
   }
   uint64_t part_bytes(uint64_t number) const { return sizes_[number]; }
+  /// Of the scene, if the codec is palette.
+  const PaletteBytes& palette() const { return palette_; }
   /// The first damaged part that was met.
   Status status() const;
 
  private:
+  Status find_palette(const Container& container, const Params& params);
   [[gnu::cold]] const std::byte* verify(uint64_t number, const Container& container) const;
 
   size_t leaves_ = 0;          ///< index into the container's table
   std::vector<size_t> nodes_;  ///< by height, from 3 on
   std::vector<size_t> parts_;
   std::vector<uint64_t> sizes_;  ///< of parts
+  PaletteBytes palette_;
   std::unique_ptr<std::atomic<const std::byte*>[]> found_;
   mutable std::mutex mutex_;
   mutable std::optional<DagView> view_;
@@ -58,6 +63,7 @@ class ColorReader {
       return {static_cast<uint8_t>(p[0]), static_cast<uint8_t>(p[1]), static_cast<uint8_t>(p[2])};
     }
     if (makes_textures(params_.codec)) return texture_.color(within);
+    if (params_.codec == ColorCodec::palette) return palette_.color(within);
     if (within < first_ || within >= last_) find(within);
     if (first_ == last_) return view_.color(within);
     return view_.color_in(macro_, block_, within % macro_block_colors);
@@ -73,6 +79,7 @@ class ColorReader {
   uint64_t part_ = ~uint64_t{0};
   const std::byte* bytes_ = nullptr;
   TextureReader texture_;
+  PaletteReader palette_;
   PartView view_;
   PartView::MacroBlock macro_;
   PartView::Block block_;

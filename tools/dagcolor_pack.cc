@@ -34,17 +34,21 @@ void declare(CommandLine& line, Options& o) {
               one_of(o.kind, {"thin", "conservative"}));
   line.option("--codec", "CODEC",
               "raw: 24 bits a colour; fws, vws: blocks with weights of fixed and of variable size; bc1, bc7, "
-              "astc: images, as textures, of 4, 8 and 0.89 to 8 bits a colour (vws)",
-              one_of(o.codec, {"raw", "fws", "vws", "bc1", "bc7", "astc"}));
+              "astc: images, as textures, of 4, 8 and 0.89 to 8 bits a colour; palette: indices into a "
+              "palette of the "
+              "scene (vws)",
+              one_of(o.codec, {"raw", "fws", "vws", "bc1", "bc7", "astc", "palette"}));
   line.option("-e,--threshold", "E",
               "Of blocks: no colour is further from the original, in RGB of 0 to 255 (9.56)",
               number(o.encoder.threshold, 0, 1e6));
   line.option("--weight-bits", "B", "Of fws: bits of a weight, 1 to 4 (3)",
               integer(o.encoder.weight_bits, 1, color::most_weight_bits));
+  line.option("--palette", "N", "Of palette: colours of the scene's, 1 to 65536 (256)",
+              integer(o.encoder.palette, 1, color::most_palette_colors));
   line.option(
       "--effort", "N",
       "Of blocks: 1: greedy merging, as published; up to 9: smaller files, slower; of textures: up to 9: "
-      "nearer, slower (3)",
+      "nearer, slower; of palette: both (3)",
       integer(o.encoder.effort, 1, 9));
   line.option("--quality", "Q",
               "Of astc: 100: blocks of 4 x 4, 8 bits a colour; down to 0: of 12 x 12, 0.89 bits (100)",
@@ -71,12 +75,13 @@ void declare(CommandLine& line, Options& o) {
 
 color::Options encoder_options(const Options& o) {
   color::Options options = o.encoder;
-  options.codec = o.codec == "raw"    ? color::ColorCodec::raw
-                  : o.codec == "fws"  ? color::ColorCodec::fws
-                  : o.codec == "bc1"  ? color::ColorCodec::bc1
-                  : o.codec == "astc" ? color::ColorCodec::astc
-                  : o.codec == "bc7"  ? color::ColorCodec::bc7
-                                      : color::ColorCodec::vws;
+  options.codec = o.codec == "raw"       ? color::ColorCodec::raw
+                  : o.codec == "fws"     ? color::ColorCodec::fws
+                  : o.codec == "bc1"     ? color::ColorCodec::bc1
+                  : o.codec == "astc"    ? color::ColorCodec::astc
+                  : o.codec == "bc7"     ? color::ColorCodec::bc7
+                  : o.codec == "palette" ? color::ColorCodec::palette
+                                         : color::ColorCodec::vws;
   options.image_curve = o.image_curve == "hilbert" ? color::ImageCurve::hilbert : color::ImageCurve::morton;
   options.curve = o.curve == "hilbert" ? color::Curve::hilbert : color::Curve::morton;
   options.colors = o.colors == "all" ? color::Colors::all : color::Colors::leaf;

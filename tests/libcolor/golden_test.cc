@@ -52,14 +52,13 @@ std::string encoded(const std::string& key, int threads) {
   const auto source = source_of(fields[0]);
   if (!source) return "no such scene";
   Options options;
-  const std::map<std::string, ColorCodec> codecs{{"raw", ColorCodec::raw},
-                                                 {"fws", ColorCodec::fws},
-                                                 {"vws", ColorCodec::vws},
-                                                 {"bc1", ColorCodec::bc1},
-                                                 {"bc7", ColorCodec::bc7}};
+  const std::map<std::string, ColorCodec> codecs{{"raw", ColorCodec::raw}, {"fws", ColorCodec::fws},
+                                                 {"vws", ColorCodec::vws}, {"bc1", ColorCodec::bc1},
+                                                 {"bc7", ColorCodec::bc7}, {"palette", ColorCodec::palette}};
   options.codec = codecs.at(fields[1]);
   options.threshold = std::stod(fields[2]);
   options.effort = std::stoi(fields[3]);
+  options.palette = 100;  // fewer than the scenes have
   options.colors = fields[4] == "all" ? Colors::all : Colors::leaf;
   options.counts = fields[5] == "pointer" ? Counts::pointer : Counts::node;
   const auto bytes = compressed(*source, options, threads);

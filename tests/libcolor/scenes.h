@@ -23,7 +23,7 @@ inline std::vector<ColorCodec> texture_codecs() {
   return codecs;
 }
 inline std::vector<ColorCodec> codecs() {
-  std::vector<ColorCodec> codecs = {ColorCodec::raw, ColorCodec::fws, ColorCodec::vws};
+  std::vector<ColorCodec> codecs = {ColorCodec::raw, ColorCodec::fws, ColorCodec::vws, ColorCodec::palette};
   for (const ColorCodec codec : texture_codecs()) codecs.push_back(codec);
   return codecs;
 }

@@ -16,7 +16,7 @@ import sys
 from container import Container, Refused, Volume, require
 
 SURFACE = 3
-CODECS = {1: "raw", 2: "fws", 3: "vws", 4: "bc1", 5: "astc", 6: "bc7"}
+CODECS = {1: "raw", 2: "fws", 3: "vws", 4: "bc1", 5: "astc", 6: "bc7", 7: "palette"}
 VOXELS, ALL = 1, 2
 IN_NODES, BESIDE = 1, 2
 WIDE = (1 << 24) - 1
@@ -56,7 +56,7 @@ class Surface:
         at = chunk.offset
         require(chunk.length == 128, "chunk DAGP: byte {}: {} bytes, expected 128", at, chunk.length)
         (self.codec, self.has_color, self.counts, self.endpoints, self.height, _, curve, self.image_curve, self.voxels, self.count,
-         self.root, self.threshold, self.error) = self.container.unpack("<8BQQI4xdd", at)
+         self.root, self.palette_size, self.threshold, self.error) = self.container.unpack("<8BQQIIdd", at)
         require(self.codec in CODECS, "chunk DAGP: byte 0: {}", self.codec)
         require(self.has_color in (VOXELS, ALL), "chunk DAGP: byte 1: {}", self.has_color)
         require(self.counts in (IN_NODES, BESIDE), "chunk DAGP: byte 2: {}", self.counts)
@@ -140,11 +140,13 @@ class Surface:
         chunks = sorted((c for c in self.container.chunks.values() if c.kind == b"COLR"), key=lambda c: c.part)
         parts = -(-self.count // PART)
         require([(c.index, c.part) for c in chunks] == [(0, i) for i in range(parts)], "chunks COLR: not their parts")
+        if CODECS[self.codec] == "palette":
+            self.read_palette()
         self.colors = []
         for chunk in chunks:
             data = self.container.data[chunk.offset:chunk.offset + chunk.length]
             n = min(PART, self.count - PART * chunk.part)
-            read = {"raw": self.raw, "bc1": self.bc1}.get(CODECS[self.codec], self.part)
+            read = {"raw": self.raw, "bc1": self.bc1, "palette": self.palettes}.get(CODECS[self.codec], self.part)
             self.colors += read(data, n)
 
     @staticmethod
@@ -176,6 +178,46 @@ class Surface:
             x, y = self.pixel(i)
             colors.append(steps[values >> 2 * (x % 4 + 4 * (y % 4)) & 3])
         return colors
+
+    # Section 4.7
+    def read_palette(self):
+        chunk, size = self.container.only(b"PALT"), self.palette_size
+        require(size <= 65536 and (size == 0) == (self.count == 0), "chunk DAGP: byte 28: {}", size)
+        require(chunk.length == 3 * size, "chunk PALT: {} bytes of {} colours", chunk.length, size)
+        self.palette = self.raw(self.container.data[chunk.offset:chunk.offset + chunk.length], size)
+
+    def palettes(self, data, n):
+        g, m = max(self.palette_size - 1, 0).bit_length(), -(-n // MACRO)
+        require(len(data) >= 16 + 8 * m, "chunk COLR: {} bytes", len(data))
+        b, e = struct.unpack_from("<II", data)
+        first_entry = 8 + 8 * m + 7 * b
+        x = first_entry + -(-e * g // 8)
+        require(x + 8 <= len(data), "chunk COLR: {} blocks and {} entries in {} bytes", b, e, len(data))
+        entry_bits, index_bits = int.from_bytes(data[first_entry:x], "little"), int.from_bytes(data[x:-8], "little")
+        end = 8 * (len(data) - x - 8)
+        entries = [entry_bits >> g * i & (1 << g) - 1 for i in range(e)]
+        heads = [struct.unpack_from("<II", data, 8 + 8 * k) for k in range(m)] + [(b, 0)]
+        firsts = [first for first, _ in heads]
+        require(firsts[0] == 0 and all(s < t for s, t in zip(firsts, firsts[1:])), "chunk COLR: macro blocks out of order")
+        numbers = []
+        for k in range(m):
+            size, bit = min(MACRO, n - MACRO * k), heads[k][1]
+            words = [int.from_bytes(data[8 + 8 * m + 7 * j:15 + 8 * m + 7 * j], "little") for j in range(firsts[k], firsts[k + 1])]
+            starts = [word & 0x3FFF for word in words] + [size]
+            require(starts[0] == 0 and all(s < t for s, t in zip(starts, starts[1:])), "chunk COLR: blocks of macro block {}", k)
+            for word, s, t in zip(words, starts, starts[1:]):
+                v, q, a = word >> 14 & 15, word >> 18 & 0x3FFFF, word >> 36
+                if v == 0:
+                    numbers += [a] * (t - s)
+                    continue
+                w = g if v == 15 else v
+                require(bit + q + w * (t - s) <= end, "chunk COLR: indices behind the end")
+                run = index_bits >> bit + q & (1 << w * (t - s)) - 1
+                indices = [run >> w * i & (1 << w) - 1 for i in range(t - s)]
+                require(v == 15 or a + max(indices) < e, "chunk COLR: entries behind the end")
+                numbers += indices if v == 15 else [entries[a + i] for i in indices]
+        require(max(numbers) < len(self.palette), "chunk COLR: no colour {}", max(numbers))
+        return [self.palette[i] for i in numbers]
 
     def part(self, data, n):
         h, m = (8 if self.endpoints == 1 else 10), -(-n // MACRO)

@@ -7,7 +7,7 @@
 namespace voxkit::cli {
 
 std::string_view name(color::ColorCodec codec) {
-  constexpr std::string_view names[] = {"", "raw", "fws", "vws", "bc1", "astc", "bc7"};
+  constexpr std::string_view names[] = {"", "raw", "fws", "vws", "bc1", "astc", "bc7", "palette"};
   return names[static_cast<size_t>(codec)];
 }
 
@@ -26,6 +26,7 @@ Json params_json(const color::Params& p) {
     json.set("endpoints", p.endpoints == color::Endpoints::rgb565 ? "565" : "888");
   }
   if (p.codec == color::ColorCodec::fws) json.set("weight_bits", p.weight_bits);
+  if (p.codec == color::ColorCodec::palette) json.set("palette", p.palette_colors);
   if (color::makes_textures(p.codec)) {
     json.set("image_curve", name(p.image_curve));
     json.set("block", fmt::format("{}x{}", p.block_size.width, p.block_size.height));
@@ -59,6 +60,9 @@ std::string sizes_text(const color::Params& p) {
   if (color::makes_textures(p.codec))
     text += fmt::format("images      {} blocks of {} x {}, along a {} curve\n", p.blocks, p.block_size.width,
                         p.block_size.height, name(p.image_curve));
+  if (p.codec == color::ColorCodec::palette)
+    text += fmt::format("palette     {} colors, {} blocks in {} macro blocks\n", p.palette_colors, p.blocks,
+                        p.macro_blocks);
   if (color::has_threshold(p.codec))
     text += fmt::format("blocks      {} in {} macro blocks, threshold {:.6g}\n", p.blocks, p.macro_blocks,
                         p.threshold);
