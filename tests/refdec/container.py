@@ -61,7 +61,7 @@ def xxh64(data):
 
 Chunk = namedtuple("Chunk", "kind index part offset length checksum")
 KINDS = (b"VOLI", b"SVMP", b"BLKS", b"VQPM", b"OFFS", b"ADDR", b"CODE", b"DAGP", b"LEAF", b"NODE",
-         b"COLR")  # any other kind is ignored
+         b"COLR", b"PALT")  # any other kind is ignored
 
 
 class Container:

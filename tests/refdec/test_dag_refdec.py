@@ -85,7 +85,7 @@ class Tools(ToolCase):
 
     def test_built_ins(self):
         for options in (("--codec", "raw"), ("--codec", "fws"), ("--codec", "vws"), ("--codec", "bc1"),
-                        ("--codec", "bc1", "--image-curve", "hilbert", "--colors", "all"), ("-e", "2"), ("-e", "25.5", "--effort", "1"),
+                        ("--codec", "palette"), ("--codec", "palette", "--palette", "3", "--colors", "all"), ("--codec", "bc1", "--image-curve", "hilbert", "--colors", "all"), ("-e", "2"), ("-e", "25.5", "--effort", "1"),
                         ("--colors", "all"), ("--counts", "pointer"), ("--colors", "all", "--counts", "pointer"),
                         ("--curve", "hilbert"), ("--curve", "hilbert", "--counts", "pointer", "--colors", "all")):
             with self.subTest(options=options):
@@ -100,7 +100,8 @@ class Tools(ToolCase):
                 data += bytes((noise.randrange(256), noise.randrange(256), noise.randrange(256), 255)
                               if noise.random() < share else 4)
             write(self.path("in.raw"), data)
-            for options in ((), ("-e", "1"), ("--colors", "all"), ("--codec", "bc1"),
+            for options in ((), ("-e", "1"), ("--colors", "all"), ("--codec", "bc1"), ("--codec", "palette"),
+                            ("--codec", "palette", "--palette", "65536"),
                             ("--curve", "hilbert", "--colors", "all")):
                 with self.subTest(dims=dims, options=options):
                     self.compare(self.encode(self.path("in.raw"), "--dims", "%d,%d,%d" % dims, "--type", "rgba8", *options))
