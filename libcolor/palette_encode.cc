@@ -45,6 +45,14 @@ Plan plan_of(std::span<const uint16_t> colors, uint32_t palette_colors, uint32_t
   return plan;
 }
 
+/// One block a macro block, without palettes of their own.
+Plan direct_plan(uint32_t colors) {
+  Plan plan;
+  for (uint32_t first = 0; first < colors; first += macro_block_colors)
+    plan.blocks.push_back({{first, std::min(colors, first + macro_block_colors), direct_width}, 0});
+  return plan;
+}
+
 std::vector<std::byte> bytes_of(std::span<const uint16_t> colors, const Plan& plan, uint32_t palette_colors) {
   const uint32_t bits = palette_bits(palette_colors);
   const size_t macro_blocks = (colors.size() + macro_block_colors - 1) / macro_block_colors;
@@ -103,6 +111,13 @@ EncodedPart encode_palette_part(std::span<const Rgb> colors, const Palette& pale
   const Plan plan = plan_of(numbers, palette_colors, uint32_t{32} << effort);
   part.blocks = plan.blocks.size();
   part.bytes = bytes_of(numbers, plan, palette_colors);
+  // Where fewer entries were shared than was thought.
+  const Plan direct = direct_plan(static_cast<uint32_t>(colors.size()));
+  if (std::vector<std::byte> bytes = bytes_of(numbers, direct, palette_colors);
+      bytes.size() < part.bytes.size()) {
+    part.blocks = direct.blocks.size();
+    part.bytes = std::move(bytes);
+  }
   return part;
 }
 
