@@ -1,4 +1,5 @@
-// What a reader module (image_stack.so, openvdb.so, dicom.so, mesh.so) offers to plugin.cc.
+// What a module (image_stack.so, openvdb.so, dicom.so, mesh.so, jpeg.so, jp2.so, png.so, imagequant.so)
+// offers to plugin.cc and coded_image.cc.
 //
 // The libraries behind these readers take up to 0.4 s to load, so programs do not link them: plugin.cc opens
 // the module when a file needs it. Modules and programs share libvoxkit-formats.so, hence one copy of every
@@ -9,6 +10,7 @@
 #include <optional>
 #include <string>
 
+#include "formats/coded_image.h"
 #include "formats/image.h"
 #include "formats/mesh_parts.h"
 #include "formats/readers.h"
@@ -16,7 +18,7 @@
 namespace voxkit {
 
 /// Grows with every change of ModuleTable or of a type that it mentions.
-inline constexpr uint32_t module_abi = 4;
+inline constexpr uint32_t module_abi = 5;
 
 struct ModuleTable {
   uint32_t abi = module_abi;
@@ -30,6 +32,11 @@ struct ModuleTable {
                         std::span<const ImageLayer> layers) = nullptr;
   /// Meshes (mesh only), not yet checked and without textures.
   Result<MeshParts> (*read_mesh)(const std::string& path, Context& ctx) = nullptr;
+  /// Images in memory (jpeg, jp2, png only): those of coded_image.h. `image` has its size, and room.
+  Result<std::vector<std::byte>> (*encode_image)(const RgbImage& image, const ImageCoding& coding) = nullptr;
+  Status (*decode_image)(std::span<const std::byte> file, RgbImage& image) = nullptr;
+  /// Leaves up to so many colours, 2 to 256 (imagequant only).
+  Status (*quantise)(RgbImage& image, int colors, int quality) = nullptr;
 };
 
 /// A module, and what to tell a user who does not have it.

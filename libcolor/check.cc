@@ -33,11 +33,12 @@ class Checker {
     VOX_CHECK(check_dag());
     const auto parts = static_cast<int64_t>(part_count(params_.color_count));
     if (params_.codec == ColorCodec::raw) return {};
-    return parallel_for(ctx_, parts, [&](int64_t part) {
-      const auto number = static_cast<uint64_t>(part);
-      return makes_textures(params_.codec)          ? check_textures(number)
-             : params_.codec == ColorCodec::palette ? check_palettes(number)
-                                                    : check_part(number);
+    return parallel_for(ctx_, parts, [&](int64_t i) {
+      const auto part = static_cast<uint64_t>(i);
+      return makes_images(params_.codec)            ? check_image(part)
+             : makes_textures(params_.codec)        ? check_textures(part)
+             : params_.codec == ColorCodec::palette ? check_palettes(part)
+                                                    : check_part(part);
     });
   }
 
@@ -178,6 +179,10 @@ class Checker {
         params_.palette_colors);
     if (wrong.empty()) return {};
     return bad(fmt::format("chunk COLR 0.{}: {}", part, wrong));
+  }
+
+  Status check_image(uint64_t part) const {
+    return volume_.store().decoded(part) ? Status() : volume_.store().status();
   }
 
   Status check_part(uint64_t part) const {

@@ -28,6 +28,10 @@ enum class ColorCodec : uint8_t {
   astc = 5,     ///< the same, blocks of 16 bytes for 16 to 144 colours; not in every build
   bc7 = 6,      ///< the same, blocks of 16 bytes for 16 colours: 8 bits each
   palette = 7,  ///< indices into palettes of blocks, of a palette of the scene (Dado et al. 2016)
+  // The same image as a file: a part is decoded as a whole. A module each.
+  jpeg = 8,
+  jp2 = 9,
+  png = 10,
 };
 
 /// Whether a codec keeps within a threshold.
@@ -40,6 +44,11 @@ constexpr bool makes_textures(ColorCodec codec) {
   return codec == ColorCodec::bc1 || codec == ColorCodec::astc || codec == ColorCodec::bc7;
 }
 
+/// Whether a codec lays colours into images that are files.
+constexpr bool makes_images(ColorCodec codec) {
+  return codec == ColorCodec::jpeg || codec == ColorCodec::jp2 || codec == ColorCodec::png;
+}
+
 inline constexpr uint32_t most_palette_colors = 1 << 16;
 
 /// What an encoder is asked for.
@@ -50,8 +59,9 @@ struct Options {
   int effort = 3;           ///< of fws and vws: 1: the paper's greedy merging; up to 9: smaller, slower; of
                             ///< textures: up to 9: nearer, slower; of palette: both
   uint32_t palette = 256;   ///< of palette: colours of the scene's, at most; 1 to 2^16
-  ImageCurve image_curve = ImageCurve::morton;  ///< of textures
-  int quality = 100;                            ///< of astc: 100: blocks of 4 x 4; down to 0: of 12 x 12
+  int image_palette = 0;    ///< of png: colours of each image, 2 to 256; 0: all
+  ImageCurve image_curve = ImageCurve::morton;  ///< of textures and images
+  int quality = 100;  ///< of astc: 100: blocks of 4 x 4; down to 0: of 12 x 12; of images: ImageCoding
   Colors colors = Colors::leaf;
   Counts counts = Counts::node;
   Curve curve = Curve::morton;  ///< in which order voxels have their colours
@@ -67,7 +77,7 @@ struct Params {
   Counts counts = Counts::node;
   Curve curve = Curve::morton;
   Endpoints endpoints = Endpoints::rgb565;
-  ImageCurve image_curve = ImageCurve::morton;  ///< of textures
+  ImageCurve image_curve = ImageCurve::morton;  ///< of textures and images
   BlockSize block_size;                         ///< of textures
   int height = leaf_height;                     ///< the grid is 2^height voxels a side
   uint32_t root = 0;
@@ -100,11 +110,14 @@ Status validate(const Options& options);
 Result<Report> encode(SurfaceSource& source, const Options& options, const ByteSink& sink, Context& ctx);
 
 /// A compressed surface, opened for random access. Safe on any bytes: every operation returns an error or a
-/// well-formed answer. The DAG is verified when it is first used, colours part by part. Const functions are
-/// thread-safe.
+/// well-formed answer. The DAG is verified when it is first used, colours part by part. Of images, the first
+/// colour of a part takes as long as all of them: they are decoded and kept (decoded_parts.h). Const
+/// functions are thread-safe.
 class Volume {
  public:
-  static Result<std::shared_ptr<const Volume>> open(std::shared_ptr<const Container> container);
+  /// `memory`: what decoded images count against; it must outlive the volume. Null: a budget of its own.
+  static Result<std::shared_ptr<const Volume>> open(std::shared_ptr<const Container> container,
+                                                    MemoryBudget* memory = nullptr);
   ~Volume();
 
   /// Voxels are rgba32: opaque where there is one, else void.
@@ -131,6 +144,7 @@ class Volume {
   std::shared_ptr<const Container> container_;
   VolumeInfo info_;
   Params params_;
+  std::optional<MemoryBudget> own_memory_;
   std::unique_ptr<Store> store_;
 };
 

@@ -11,6 +11,7 @@
 #include "libcolor/color_order.h"
 #include "libcolor/dag_builder.h"
 #include "libcolor/dag_recount.h"
+#include "libcolor/image_codec.h"
 #include "libcolor/layout.h"
 #include "libcolor/palette_encode.h"
 #include "libcolor/texture.h"
@@ -34,6 +35,9 @@ class ColorWriter {
     batch_ = static_cast<size_t>(2 * ctx_.threads);
     constexpr uint64_t part_bytes = uint64_t{part_colors} * (sizeof(Rgb) + 4);  // and what becomes of them
     VOX_CHECK(reservation_.add(batch_ * part_bytes, "room for colors"));
+    if (makes_images(options_.codec))
+      VOX_CHECK(reservation_.add(static_cast<uint64_t>(ctx_.threads) * image_part_work_bytes(options_.codec),
+                                 "encoding images of colors"));
     colors_.reserve(batch_ << part_log2);
     return {};
   }
@@ -62,7 +66,7 @@ class ColorWriter {
     VOX_CHECK(parallel_for(ctx_, static_cast<int64_t>(count), [&](int64_t i) -> Status {
       const auto part = static_cast<uint64_t>(i);
       const auto own = std::span(colors_).subspan(part << part_log2, colors_of_part(colors_.size(), part));
-      encoded[part] = encode(own);
+      VOX_TRY(encoded[part], encode(own));
       return {};
     }));
     for (const EncodedPart& part : encoded) {
@@ -76,7 +80,8 @@ class ColorWriter {
     seconds += seconds_since(start);
     return {};
   }
-  EncodedPart encode(std::span<const Rgb> colors) const {
+  Result<EncodedPart> encode(std::span<const Rgb> colors) const {
+    if (makes_images(options_.codec)) return encode_as_image(colors, options_);
     if (makes_textures(options_.codec)) return encode_texture(colors, options_);
     if (palette_ != nullptr) return encode_palette_part(colors, *palette_, options_.effort);
     if (options_.codec != ColorCodec::raw)
@@ -124,7 +129,11 @@ Status validate(const Options& o) {
     return bad_usage(fmt::format("quality {}: expected 0 to 100", o.quality));
   if (o.palette < 1 || o.palette > most_palette_colors)
     return bad_usage(fmt::format("a palette of {} colors: expected 1 to {}", o.palette, most_palette_colors));
+  if (o.image_palette != 0 && (o.image_palette < 2 || o.image_palette > 256))
+    return bad_usage(fmt::format("a palette of {} colors: expected 2 to 256, or 0", o.image_palette));
   VOX_CHECK(texture_support(o.codec));
+  if (makes_images(o.codec))
+    VOX_CHECK(image_encoder_support(image_format(o.codec), image_coding_of(o, part_colors)));
   if (o.effort < 1 || o.effort > 9) return bad_usage(fmt::format("effort {}: expected 1 to 9", o.effort));
   return {};
 }

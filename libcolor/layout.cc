@@ -30,7 +30,7 @@ std::vector<std::byte> pack_params(const Params& p) {
   bytes[4] = static_cast<std::byte>(p.height);
   bytes[5] = static_cast<std::byte>(p.weight_bits);
   bytes[6] = static_cast<std::byte>(p.curve);
-  if (makes_textures(p.codec)) bytes[7] = static_cast<std::byte>(p.image_curve);
+  if (makes_textures(p.codec) || makes_images(p.codec)) bytes[7] = static_cast<std::byte>(p.image_curve);
   if (p.codec == ColorCodec::astc) {
     bytes[88] = static_cast<std::byte>(p.block_size.width);
     bytes[89] = static_cast<std::byte>(p.block_size.height);
@@ -64,7 +64,7 @@ Result<Params> unpack_params(std::span<const std::byte> bytes, const VolumeInfo&
     if (field(at) >= 1 && field(at) <= most) return {};
     return bad(at, fmt::format("unknown {} {}", what, field(at)));
   };
-  VOX_CHECK(is_one_of(0, 7, "color codec"));
+  VOX_CHECK(is_one_of(0, 10, "color codec"));
   VOX_CHECK(is_one_of(1, 2, "choice of colors"));
   VOX_CHECK(is_one_of(2, 2, "place of counts"));
   VOX_CHECK(is_one_of(3, 2, "kind of endpoints"));
@@ -75,7 +75,7 @@ Result<Params> unpack_params(std::span<const std::byte> bytes, const VolumeInfo&
   p.counts = static_cast<Counts>(field(2));
   p.endpoints = static_cast<Endpoints>(field(3));
   p.curve = static_cast<Curve>(field(6));
-  if (makes_textures(p.codec)) {
+  if (makes_textures(p.codec) || makes_images(p.codec)) {
     VOX_CHECK(is_one_of(7, 2, "curve of images"));
     p.image_curve = static_cast<ImageCurve>(field(7));
     if (const Status support = texture_support(p.codec); !support)

@@ -4,6 +4,8 @@
 
 #include <algorithm>
 
+#include "libcolor/image_codec.h"
+
 namespace voxkit::color {
 
 Status Store::find_chunks(const Container& container, const Params& params) {
@@ -112,13 +114,42 @@ const std::byte* Store::verify(uint64_t number, const Container& container) cons
   return nullptr;
 }
 
+void Store::decode_images(const Container& container, const Params& params, MemoryBudget& memory) {
+  if (!makes_images(params.codec)) return;
+  decoded_ = std::make_unique<DecodedParts>(
+      parts_.size(), memory, image_part_work_bytes(params.codec),
+      [&](uint64_t number) -> Result<std::vector<Rgb>> {
+        VOX_TRY(const auto bytes, container.chunk(parts_[number]));
+        auto colors = decode_as_image(bytes, params.codec, params.image_curve,
+                                      colors_of_part(params.color_count, number));
+        if (!colors)
+          return fail(colors.error().code, container.name(),
+                      fmt::format("chunk COLR 0.{}: {}", number, colors.error().what));
+        return colors;
+      });
+}
+
+std::shared_ptr<const DecodedParts::Part> Store::decoded(uint64_t number) const {
+  auto part = decoded_->get(number);
+  if (part) return std::move(*part);
+  const std::lock_guard lock(mutex_);
+  if (status_) status_ = tl::unexpected<Error>(part.error());
+  return nullptr;
+}
+
 Status Store::status() const {
   const std::lock_guard lock(mutex_);
   return status_;
 }
 
 bool ColorReader::open(uint64_t part) {
-  bytes_ = store_.part(part, container_);
+  if (store_.decodes_parts()) {
+    decoded_ = store_.decoded(part);
+    bytes_ = decoded_ ? reinterpret_cast<const std::byte*>(decoded_->data()) : nullptr;
+  } else {
+    bytes_ = store_.part(part, container_);
+  }
+  plain_ = store_.decodes_parts() || params_.codec == ColorCodec::raw;
   first_ = last_ = 0;
   part_ = bytes_ != nullptr ? part : ~uint64_t{0};
   if (bytes_ == nullptr) return false;

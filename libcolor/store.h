@@ -7,6 +7,7 @@
 #include <vector>
 
 #include "libcolor/dag_view.h"
+#include "libcolor/decoded_parts.h"
 #include "libcolor/layout.h"
 #include "libcolor/palette_layout.h"
 #include "libcolor/texture.h"
@@ -17,6 +18,8 @@ class Store {
  public:
   /// Finds the chunks that follow from the parameters, and no others; verifies the palette.
   Status find_chunks(const Container& container, const Params& params);
+  /// Of images: what parts are decoded by. Both arguments must outlive the store.
+  void decode_images(const Container& container, const Params& params, MemoryBudget& memory);
   /// The DAG, all of which is verified now.
   Result<const DagView*> dag(const Container& container, const Params& params) const;
   /// The bytes of a part of the colours; null if it is damaged, which `status` then tells.
@@ -27,6 +30,10 @@ class Store {
   uint64_t part_bytes(uint64_t number) const { return sizes_[number]; }
   /// Of the scene, if the codec is palette.
   const PaletteBytes& palette() const { return palette_; }
+  /// Whether parts are decoded as a whole; the colours of one; null if it is damaged, which `status` then
+  /// tells.
+  bool decodes_parts() const { return decoded_ != nullptr; }
+  std::shared_ptr<const DecodedParts::Part> decoded(uint64_t number) const;
   /// The first damaged part that was met.
   Status status() const;
 
@@ -44,6 +51,7 @@ class Store {
   mutable std::optional<DagView> view_;
   mutable std::atomic<const DagView*> ready_{nullptr};
   mutable Status status_;
+  std::unique_ptr<DecodedParts> decoded_;
 };
 
 /// Colours of an opened file, one after the other or in any order; one for each thread. Errors are the
@@ -58,7 +66,7 @@ class ColorReader {
     const uint64_t part = index >> part_log2;
     if (part != part_ && !open(part)) return {};
     const auto within = static_cast<uint32_t>(index & (part_colors - 1));
-    if (params_.codec == ColorCodec::raw) {
+    if (plain_) {
       const std::byte* const p = bytes_ + uint64_t{within} * 3;
       return {static_cast<uint8_t>(p[0]), static_cast<uint8_t>(p[1]), static_cast<uint8_t>(p[2])};
     }
@@ -78,6 +86,8 @@ class ColorReader {
   const Params& params_;
   uint64_t part_ = ~uint64_t{0};
   const std::byte* bytes_ = nullptr;
+  bool plain_ = false;  ///< `bytes_` are R, G, B of each colour
+  std::shared_ptr<const DecodedParts::Part> decoded_;
   TextureReader texture_;
   PaletteReader palette_;
   PartView view_;

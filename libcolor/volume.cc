@@ -70,7 +70,8 @@ class BoxWalk {
 Volume::Volume() = default;
 Volume::~Volume() = default;
 
-Result<std::shared_ptr<const Volume>> Volume::open(std::shared_ptr<const Container> container) {
+Result<std::shared_ptr<const Volume>> Volume::open(std::shared_ptr<const Container> container,
+                                                   MemoryBudget* memory) {
   const std::string& file = container->name();
   if (container->codec() != Codec::color) return bad_input(file, "header, byte 10: not a coloured surface");
   std::shared_ptr<Volume> volume(new Volume);
@@ -80,6 +81,8 @@ Result<std::shared_ptr<const Volume>> Volume::open(std::shared_ptr<const Contain
   VOX_TRY(volume->params_, unpack_params(params_bytes, volume->info_, file));
   volume->store_ = std::make_unique<Store>();
   VOX_CHECK(volume->store_->find_chunks(*container, volume->params_));
+  if (memory == nullptr) memory = &volume->own_memory_.emplace();
+  volume->store_->decode_images(*container, volume->params_, *memory);
   volume->container_ = std::move(container);
   return volume;
 }

@@ -18,6 +18,7 @@ struct Options {
   std::string kind = "thin", codec = "vws", image_curve = "morton", curve = "morton", colors = "leaf",
               counts = "node";
   color::Options encoder;
+  std::optional<uint32_t> palette;
   bool verify = false;
 };
 
@@ -35,26 +36,30 @@ void declare(CommandLine& line, Options& o) {
   line.option("--codec", "CODEC",
               "raw: 24 bits a colour; fws, vws: blocks with weights of fixed and of variable size; bc1, bc7, "
               "astc: images, as textures, of 4, 8 and 0.89 to 8 bits a colour; palette: indices into a "
-              "palette of the "
-              "scene (vws)",
-              one_of(o.codec, {"raw", "fws", "vws", "bc1", "bc7", "astc", "palette"}));
+              "palette of the scene; jpeg, jp2, png: images as files, smaller, but decoded as a whole (vws)",
+              one_of(o.codec, {"raw", "fws", "vws", "bc1", "bc7", "astc", "palette", "jpeg", "jp2", "png"}));
   line.option("-e,--threshold", "E",
               "Of blocks: no colour is further from the original, in RGB of 0 to 255 (9.56)",
               number(o.encoder.threshold, 0, 1e6));
   line.option("--weight-bits", "B", "Of fws: bits of a weight, 1 to 4 (3)",
               integer(o.encoder.weight_bits, 1, color::most_weight_bits));
-  line.option("--palette", "N", "Of palette: colours of the scene's, 1 to 65536 (256)",
-              integer(o.encoder.palette, 1, color::most_palette_colors));
+  line.option(
+      "--palette", "N",
+      "Of palette: colours of the scene's, 1 to 65536 (256). Of png: of each image, 2 to 256; 0: all (0)",
+      integer(o.palette, 0, color::most_palette_colors));
   line.option(
       "--effort", "N",
       "Of blocks: 1: greedy merging, as published; up to 9: smaller files, slower; of textures: up to 9: "
       "nearer, slower; of palette: both (3)",
       integer(o.encoder.effort, 1, 9));
-  line.option("--quality", "Q",
-              "Of astc: 100: blocks of 4 x 4, 8 bits a colour; down to 0: of 12 x 12, 0.89 bits (100)",
-              integer(o.encoder.quality, 0, 100));
+  line.option(
+      "--quality", "Q",
+      "Of astc: 100: blocks of 4 x 4, 8 bits a colour; down to 0: of 12 x 12, 0.89 bits. Of jpeg: that "
+      "of libjpeg. Of jp2: 100: lossless; 80: a fifth of 24 bits; half as many for each 20 less. Of "
+      "png: 100: lossless; else that of libimagequant (100)",
+      integer(o.encoder.quality, 0, 100));
   line.option("--image-curve", "CURVE",
-              "Of textures: colours are laid along a curve: morton or hilbert (morton)",
+              "Of textures and images: colours are laid along a curve: morton or hilbert (morton)",
               one_of(o.image_curve, {"morton", "hilbert"}));
   line.option("--curve", "CURVE",
               "Colours are in the order of a curve through space: morton or hilbert; hilbert: a little "
@@ -75,13 +80,11 @@ void declare(CommandLine& line, Options& o) {
 
 color::Options encoder_options(const Options& o) {
   color::Options options = o.encoder;
-  options.codec = o.codec == "raw"       ? color::ColorCodec::raw
-                  : o.codec == "fws"     ? color::ColorCodec::fws
-                  : o.codec == "bc1"     ? color::ColorCodec::bc1
-                  : o.codec == "astc"    ? color::ColorCodec::astc
-                  : o.codec == "bc7"     ? color::ColorCodec::bc7
-                  : o.codec == "palette" ? color::ColorCodec::palette
-                                         : color::ColorCodec::vws;
+  options.codec = *codec_named(o.codec);
+  if (o.palette) {
+    options.palette = *o.palette;
+    options.image_palette = static_cast<int>(*o.palette);
+  }
   options.image_curve = o.image_curve == "hilbert" ? color::ImageCurve::hilbert : color::ImageCurve::morton;
   options.curve = o.curve == "hilbert" ? color::Curve::hilbert : color::Curve::morton;
   options.colors = o.colors == "all" ? color::Colors::all : color::Colors::leaf;

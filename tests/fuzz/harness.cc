@@ -285,6 +285,9 @@ const std::vector<Reader>& readers() {
       {"mesh_ply", nullptr, read_mesh_ply, mesh_ply_seeds},
       {"mesh_gltf", "mesh", read_mesh_gltf, mesh_gltf_seeds},
       {"mesh_obj", "mesh", read_mesh_obj, mesh_obj_seeds},
+      {"jpeg", "jpeg", read_jpeg, jpeg_seeds},
+      {"jp2", "jp2", read_jp2, jp2_seeds},
+      {"png", "png", read_png, png_seeds},
   };
   return all;
 }

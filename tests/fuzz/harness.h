@@ -39,6 +39,10 @@ Verdict read_mesh_ply(Input input);
 /// GLB where it starts so.
 Verdict read_mesh_gltf(Input input);
 Verdict read_mesh_obj(Input input);
+/// Images in memory: the first two bytes are their width and height.
+Verdict read_jpeg(Input input);
+Verdict read_jp2(Input input);
+Verdict read_png(Input input);
 
 struct Reader {
   const char* name;    ///< also of the fuzz target

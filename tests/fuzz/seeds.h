@@ -18,5 +18,8 @@ std::vector<std::string> dicom_seeds();
 std::vector<std::string> mesh_ply_seeds();
 std::vector<std::string> mesh_gltf_seeds();
 std::vector<std::string> mesh_obj_seeds();
+std::vector<std::string> jpeg_seeds();
+std::vector<std::string> jp2_seeds();
+std::vector<std::string> png_seeds();
 
 }  // namespace voxkit::fuzz

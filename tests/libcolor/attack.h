@@ -65,7 +65,8 @@ inline Answer attack(std::span<const std::byte> file) {
     answer.fault = judge(container.error());
     return answer;
   }
-  const auto opened = Volume::open(*container);
+  MemoryBudget decoded(uint64_t{256} << 20);
+  const auto opened = Volume::open(*container, &decoded);
   if (!opened) {
     answer.fault = judge(opened.error());
     return answer;

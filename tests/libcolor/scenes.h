@@ -8,6 +8,7 @@
 #include <vector>
 
 #include "libcolor/color.h"
+#include "libcolor/image_codec.h"
 #include "libcolor/morton.h"
 #include "libcolor/surface.h"
 #include "libcolor/texture.h"
@@ -16,15 +17,23 @@ namespace voxkit::color {
 
 using Voxels = std::vector<SurfaceVoxel>;
 
-/// All codecs that make textures in this build; all codecs that it has.
+/// All codecs that make textures in this build; below, all codecs that it has.
 inline std::vector<ColorCodec> texture_codecs() {
   std::vector<ColorCodec> codecs = {ColorCodec::bc1, ColorCodec::bc7};
   if (texture_support(ColorCodec::astc)) codecs.push_back(ColorCodec::astc);
   return codecs;
 }
+/// Those that make images.
+inline std::vector<ColorCodec> image_codecs() {
+  std::vector<ColorCodec> codecs;
+  for (const ColorCodec codec : {ColorCodec::jpeg, ColorCodec::jp2, ColorCodec::png})
+    if (image_codec_support(image_format(codec))) codecs.push_back(codec);
+  return codecs;
+}
 inline std::vector<ColorCodec> codecs() {
   std::vector<ColorCodec> codecs = {ColorCodec::raw, ColorCodec::fws, ColorCodec::vws, ColorCodec::palette};
   for (const ColorCodec codec : texture_codecs()) codecs.push_back(codec);
+  for (const ColorCodec codec : image_codecs()) codecs.push_back(codec);
   return codecs;
 }
 

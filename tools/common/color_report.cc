@@ -5,10 +5,22 @@
 #include <algorithm>
 
 namespace voxkit::cli {
+namespace {
+
+/// By number.
+constexpr std::string_view codec_names[] = {"",    "raw",     "fws",  "vws", "bc1", "astc",
+                                            "bc7", "palette", "jpeg", "jp2", "png"};
+
+}  // namespace
 
 std::string_view name(color::ColorCodec codec) {
-  constexpr std::string_view names[] = {"", "raw", "fws", "vws", "bc1", "astc", "bc7", "palette"};
-  return names[static_cast<size_t>(codec)];
+  return codec_names[static_cast<size_t>(codec)];
+}
+
+std::optional<color::ColorCodec> codec_named(std::string_view text) {
+  const auto* const at = std::find(std::begin(codec_names), std::end(codec_names), text);
+  if (at == std::end(codec_names)) return std::nullopt;
+  return static_cast<color::ColorCodec>(at - std::begin(codec_names));
 }
 
 std::string_view name(color::ImageCurve curve) {
@@ -31,6 +43,7 @@ Json params_json(const color::Params& p) {
     json.set("image_curve", name(p.image_curve));
     json.set("block", fmt::format("{}x{}", p.block_size.width, p.block_size.height));
   }
+  if (color::makes_images(p.codec)) json.set("image_curve", name(p.image_curve));
   json.set("curve", name(p.curve));
   json.set("colors", p.colors == color::Colors::leaf ? "leaf" : "all");
   json.set("counts", p.counts == color::Counts::node ? "node" : "pointer");
@@ -63,6 +76,9 @@ std::string sizes_text(const color::Params& p) {
   if (p.codec == color::ColorCodec::palette)
     text += fmt::format("palette     {} colors, {} blocks in {} macro blocks\n", p.palette_colors, p.blocks,
                         p.macro_blocks);
+  if (color::makes_images(p.codec))
+    text += fmt::format("images      {}, along a {} curve\n",
+                        (p.color_count + color::part_colors - 1) / color::part_colors, name(p.image_curve));
   if (color::has_threshold(p.codec))
     text += fmt::format("blocks      {} in {} macro blocks, threshold {:.6g}\n", p.blocks, p.macro_blocks,
                         p.threshold);

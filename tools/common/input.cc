@@ -21,7 +21,7 @@ Result<std::shared_ptr<const Container>> container_of(std::shared_ptr<const Mapp
   return Container::open(bytes, name, std::move(file));
 }
 
-Result<Input> open_codec(std::shared_ptr<const Container> container, int level) {
+Result<Input> open_codec(std::shared_ptr<const Container> container, int level, Context& ctx) {
   const auto check_level = [&](int levels) -> Status {
     if (level < levels) return {};
     return fail(
@@ -37,7 +37,7 @@ Result<Input> open_codec(std::shared_ptr<const Container> container, int level) 
   }
   if (container->codec() == Codec::color) {
     VOX_CHECK(check_level(1));
-    VOX_TRY(input.color, color::Volume::open(std::move(container)));
+    VOX_TRY(input.color, color::Volume::open(std::move(container), ctx.memory));
     input.source = color::open_source(input.color);
     return input;
   }
@@ -104,15 +104,15 @@ Result<std::shared_ptr<const Container>> open_container(const std::string& name)
   return container_of(std::move(file));
 }
 
-Result<Input> open_compressed(const std::string& name, int level, Context&) {
+Result<Input> open_compressed(const std::string& name, int level, Context& ctx) {
   VOX_TRY(auto container, open_container(name));
-  return open_codec(std::move(container), level);
+  return open_codec(std::move(container), level, ctx);
 }
 
 Result<Input> open_spooled(std::shared_ptr<const MappedFile> file, Context& ctx) {
   if (is_container(file->bytes())) {
     VOX_TRY(auto container, container_of(std::move(file)));
-    return open_codec(std::move(container), 0);
+    return open_codec(std::move(container), 0, ctx);
   }
   Input input;
   VOX_TRY(input.source, open_nrrd(stream_of(std::move(file)), ctx));
