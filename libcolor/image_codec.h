@@ -1,5 +1,5 @@
 // Parts of the colours as images in files: JPEG, JPEG 2000, PNG (section 4.1.2 of the paper; FORMAT.md,
-// section 4.7).
+// section 4.8).
 #pragma once
 
 #include <span>

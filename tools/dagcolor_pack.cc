@@ -81,10 +81,9 @@ void declare(CommandLine& line, Options& o) {
 color::Options encoder_options(const Options& o) {
   color::Options options = o.encoder;
   options.codec = *codec_named(o.codec);
-  if (o.palette) {
-    options.palette = *o.palette;
+  if (o.palette && options.codec == color::ColorCodec::palette) options.palette = *o.palette;
+  if (o.palette && options.codec == color::ColorCodec::png)
     options.image_palette = static_cast<int>(*o.palette);
-  }
   options.image_curve = o.image_curve == "hilbert" ? color::ImageCurve::hilbert : color::ImageCurve::morton;
   options.curve = o.curve == "hilbert" ? color::Curve::hilbert : color::Curve::morton;
   options.colors = o.colors == "all" ? color::Colors::all : color::Colors::leaf;

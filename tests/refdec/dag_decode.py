@@ -4,7 +4,7 @@
     dag_decode.py FILE.dagc OUT.raw    write the voxels, RGBA, x fastest
     dag_decode.py --info FILE.dagc     print what the headers say as JSON
 
-It decodes all that section 4 has but storages astc and bc7. It is meant to be read and to be trusted, not to be fast. Section numbers are those of FORMAT.md.
+It decodes all that section 4 has but storages astc, bc7, jpeg and jp2, and interlaced PNG. It is meant to be read and to be trusted, not to be fast. Section numbers are those of FORMAT.md.
 Exit codes: 0 done, 2 usage, 3 the file is unreadable, corrupt or unsupported, 4 cannot write, 5 too large.
 """
 
@@ -14,9 +14,10 @@ import struct
 import sys
 
 from container import Container, Refused, Volume, require
+from png_decode import read_png
 
 SURFACE = 3
-CODECS = {1: "raw", 2: "fws", 3: "vws", 4: "bc1", 5: "astc", 6: "bc7", 7: "palette"}
+CODECS = {1: "raw", 2: "fws", 3: "vws", 4: "bc1", 5: "astc", 6: "bc7", 7: "palette", 8: "jpeg", 9: "jp2", 10: "png"}
 VOXELS, ALL = 1, 2
 IN_NODES, BESIDE = 1, 2
 WIDE = (1 << 24) - 1
@@ -63,8 +64,8 @@ class Surface:
         require(self.endpoints in (1, 2), "chunk DAGP: byte 3: {}", self.endpoints)
         require(curve in (1, 2), "chunk DAGP: byte 6: {}", curve)
         self.hilbert = curve == 2
-        require(CODECS[self.codec] != "bc1" or self.image_curve in (1, 2), "chunk DAGP: byte 7: {}", self.image_curve)
-        require(CODECS[self.codec] not in ("astc", "bc7"), "chunk DAGP: byte 0: {} is not supported by this decoder",
+        require(CODECS[self.codec] not in ("bc1", "png") or self.image_curve in (1, 2), "chunk DAGP: byte 7: {}", self.image_curve)
+        require(CODECS[self.codec] not in ("astc", "bc7", "jpeg", "jp2"), "chunk DAGP: byte 0: {} is not supported by this decoder",
                 CODECS[self.codec])
         height = 2
         while 1 << height < max(self.volume.dims):
@@ -146,7 +147,7 @@ class Surface:
         for chunk in chunks:
             data = self.container.data[chunk.offset:chunk.offset + chunk.length]
             n = min(PART, self.count - PART * chunk.part)
-            read = {"raw": self.raw, "bc1": self.bc1, "palette": self.palettes}.get(CODECS[self.codec], self.part)
+            read = {"raw": self.raw, "bc1": self.bc1, "palette": self.palettes, "png": self.png}.get(CODECS[self.codec], self.part)
             self.colors += read(data, n)
 
     @staticmethod
@@ -218,6 +219,13 @@ class Surface:
                 numbers += indices if v == 15 else [entries[a + i] for i in indices]
         require(max(numbers) < len(self.palette), "chunk COLR: no colour {}", max(numbers))
         return [self.palette[i] for i in numbers]
+
+    # Section 4.8
+    def png(self, data, n):
+        pixels = [self.pixel(i) for i in range(n)]
+        width, height = max(x for x, _ in pixels) + 1, max(y for _, y in pixels) + 1
+        rows = read_png(data, width, height)
+        return [rows[y][x] for x, y in pixels]
 
     def part(self, data, n):
         h, m = (8 if self.endpoints == 1 else 10), -(-n // MACRO)

@@ -85,7 +85,9 @@ class Tools(ToolCase):
 
     def test_built_ins(self):
         for options in (("--codec", "raw"), ("--codec", "fws"), ("--codec", "vws"), ("--codec", "bc1"),
-                        ("--codec", "palette"), ("--codec", "palette", "--palette", "3", "--colors", "all"), ("--codec", "bc1", "--image-curve", "hilbert", "--colors", "all"), ("-e", "2"), ("-e", "25.5", "--effort", "1"),
+                        ("--codec", "palette"), ("--codec", "palette", "--palette", "3", "--colors", "all"),
+                        ("--codec", "bc1", "--image-curve", "hilbert", "--colors", "all"),
+                        ("--codec", "png"), ("--codec", "png", "--palette", "5", "--image-curve", "hilbert"), ("--codec", "png", "--palette", "200"), ("-e", "2"), ("-e", "25.5", "--effort", "1"),
                         ("--colors", "all"), ("--counts", "pointer"), ("--colors", "all", "--counts", "pointer"),
                         ("--curve", "hilbert"), ("--curve", "hilbert", "--counts", "pointer", "--colors", "all")):
             with self.subTest(options=options):
@@ -100,11 +102,17 @@ class Tools(ToolCase):
                 data += bytes((noise.randrange(256), noise.randrange(256), noise.randrange(256), 255)
                               if noise.random() < share else 4)
             write(self.path("in.raw"), data)
-            for options in ((), ("-e", "1"), ("--colors", "all"), ("--codec", "bc1"), ("--codec", "palette"),
+            for options in ((), ("-e", "1"), ("--colors", "all"), ("--codec", "bc1"), ("--codec", "palette"), ("--codec", "png"),
                             ("--codec", "palette", "--palette", "65536"),
                             ("--curve", "hilbert", "--colors", "all")):
                 with self.subTest(dims=dims, options=options):
                     self.compare(self.encode(self.path("in.raw"), "--dims", "%d,%d,%d" % dims, "--type", "rgba8", *options))
+
+    def test_what_it_cannot_read_it_refuses(self):
+        for codec in ("bc7", "jpeg", "jp2"):
+            with self.subTest(codec=codec):
+                done = self.run_program(sys.executable, DECODER, self.encode("menger:2", "--codec", codec), self.path("x.raw"), expect=3)
+                self.assertIn(codec + " is not supported", done.stderr)
 
     def test_damaged_files_are_refused(self):
         data = read(self.encode("menger:2"))
