@@ -1,0 +1,1 @@
+"""The modules of vox-sweep; README.md says which is what."""

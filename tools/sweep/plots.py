@@ -1,0 +1,140 @@
+"""Charts as files, SVG and PNG, by matplotlib."""
+import hashlib
+import io
+import json
+import os
+
+from sweep import table
+from sweep.page import column_names
+from sweep.runner import write_whole
+
+MADE_OF = ".made-of"  # the file with a digest of the results
+MARKERS = "o^sDvPX*"
+COLORS = ("#0072b2", "#d55e00", "#009e73", "#cc79a7", "#7a6a00", "#56b4e9", "#4d4d4d", "#e69f00")
+
+
+def available():
+    try:
+        import matplotlib  # noqa: F401
+        import numpy  # noqa: F401
+    except ImportError:
+        return False
+    return True
+
+
+def digest(spec, flats):
+    return hashlib.sha256(json.dumps([flats, repr(spec.plots)]).encode()).hexdigest() + "\n"
+
+
+def fresh(spec, flats, folder):
+    """Whether the plots that are there are those of these results."""
+    try:
+        with open(os.path.join(folder, MADE_OF), encoding="ascii") as file:
+            return file.read() == digest(spec, flats)
+    except (OSError, ValueError):
+        return False
+
+
+def usual_plots(spec, columns):
+    """(name, title, x, y, log x, log y, labels, line, fit) of what every sweep draws, and what its spec asks for."""
+    times = [f"{render.name}.ms_avg" for render in spec.renders] + ["decode_seconds", "encode_seconds"]
+    time = next((name for name in times if name in columns), None)
+    found = []
+    if "psnr_db" in columns:
+        found.append(("size-error", "Size and error", "bits_per_voxel", "psnr_db", False, False, (), True, ""))
+        if time:
+            found.append(("time-error", "Time and error", time, "psnr_db", False, False, (), True, ""))
+    return found + [(plot.name, plot.title, plot.x, plot.y, plot.log_x, plot.log_y, plot.label, plot.line, plot.fit)
+                    for plot in spec.plots]
+
+
+def write(spec, flats, folder):
+    """Writes the plots of each input into the folder; names of columns that are not there are returned."""
+    import matplotlib
+    matplotlib.use("Agg")
+    matplotlib.rcParams["svg.hashsalt"] = "vox-sweep"  # the same file for the same results
+    columns = table.columns_of(flats)
+    names, unknown = column_names(columns), []
+    os.makedirs(folder, exist_ok=True)
+    for plot in usual_plots(spec, columns):
+        x, y = table.find_column(plot[2], columns), table.find_column(plot[3], columns)
+        if x is None or y is None:
+            unknown.append(plot[2] if x is None else plot[3])
+            continue
+        for data, figure in figures(plot, x, y, flats, names, columns):
+            for ending in ("svg", "png"):
+                file = io.BytesIO()
+                figure.savefig(file, format=ending, dpi=120, metadata={"Date": None} if ending == "svg" else None)
+                write_whole(os.path.join(folder, f"{plot[0]}{data}.{ending}"), file.getvalue())
+    if not unknown:
+        write_whole(os.path.join(folder, MADE_OF), digest(spec, flats))
+    return unknown
+
+
+def figures(plot, x, y, flats, names, columns):
+    """(ending of the file's name, figure): one an input; one of all of them where a curve is fitted."""
+    _, title, _, _, log_x, log_y, labels, line, fit = plot
+    inputs = list(dict.fromkeys(values["input"] for values in flats))
+    for group in ([inputs] if fit else [[name] for name in inputs]):
+        of_group = [values for values in flats if values["input"] in group and finite(values.get(x))]
+        points = [values for values in of_group if finite(values.get(y))]
+        exact = [values for values in of_group if table.number(values.get(y)) == float("inf")]
+        if not points and not exact:
+            continue
+        figure, axes = new_figure()
+        for index, codec in enumerate(dict.fromkeys(values["codec"] for values in of_group)):
+            own = sorted((values for values in points if values["codec"] == codec), key=lambda values: table.number(values[x]))
+            across, up = ([table.number(values[column]) for values in own] for column in (x, y))
+            color = COLORS[index % len(COLORS)]
+            if own:
+                axes.plot(across, up, marker=MARKERS[index % len(MARKERS)], color=color, label=codec, linestyle="none",
+                          markersize=5, alpha=0.85)
+            if line and not fit:
+                draw_front(axes, x, y, across, up, color)
+            if fit:
+                draw_fit(axes, across, up, color, codec)
+            for values, a, b in zip(own, across, up) if labels else ():
+                words = [str(values.get(table.find_column(label, columns) or "", "–")) for label in labels]
+                axes.annotate(f"({', '.join(words)})", (a, b), fontsize=6.5, xytext=(4, 3), textcoords="offset points")
+            lossless = [table.number(values[x]) for values in exact if values["codec"] == codec]
+            if lossless:  # infinitely good: the best of these has a line
+                axes.axvline((max if table.higher_is_better(x) else min)(lossless), color=color, linestyle=":", label=f"{codec}, lossless")
+        axes.set(title=title if fit else f"{title}: {group[0]}", xlabel=names.get(x, x), ylabel=names.get(y, y),
+                 xscale="log" if log_x else "linear", yscale="log" if log_y else "linear")
+        axes.grid(alpha=0.3)
+        axes.legend(fontsize=8)
+        yield "" if fit or len(inputs) == 1 else "-" + "".join(c if c.isalnum() or c in ".-" else "-" for c in group[0]), figure
+
+
+def new_figure():
+    from matplotlib.figure import Figure  # without pyplot, which keeps figures
+    figure = Figure(figsize=(7, 5), layout="constrained")
+    return figure, figure.add_subplot()
+
+
+def draw_front(axes, x, y, across, up, color):
+    """Through those points of a codec that none of its others beats."""
+    turned = [[-value for value in values] if table.higher_is_better(column) else values
+              for column, values in ((x, across), (y, up))]
+    best = table.front(list(zip(*turned)))
+    axes.plot([across[i] for i in best], [up[i] for i in best], color=color, linewidth=1)
+
+
+def draw_fit(axes, across, up, color, codec):
+    """y = a x^b by least squares of the logarithms, and how much of their variance it explains."""
+    import numpy
+    points = [(a, b) for a, b in zip(across, up) if a > 0 and b > 0]
+    if len({a for a, _ in points}) < 2:
+        return
+    u, v = (numpy.log([point[i] for point in points]) for i in (0, 1))
+    slope, offset = numpy.polyfit(u, v, 1)
+    spread = ((v - v.mean()) ** 2).sum()
+    share = 1 - ((v - slope * u - offset) ** 2).sum() / spread if spread > 0 else 1
+    line = numpy.linspace(min(across), max(across), 100)
+    axes.plot(line, numpy.exp(offset) * line**slope, color=color, linewidth=1,
+              label=f"{codec}: {numpy.exp(offset):.3g} x^{slope:.3g}, R² {share:.2f}")
+
+
+def finite(value):
+    found = table.number(value)
+    return found is not None and abs(found) != float("inf") and found == found

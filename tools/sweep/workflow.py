@@ -1,0 +1,49 @@
+"""The same sweep as a Snakemake workflow: one job a setting, on this machine or on a cluster."""
+import json
+import os
+
+TEMPLATE = '''# Written by vox-sweep --snakemake: one job for each setting, then the tables and the page.
+#
+#   snakemake --cores 4                                    on this machine
+#   snakemake --slurm --jobs 100                           on Slurm
+#
+# A setting that fails is marked in the tables; the others go on.
+import shlex
+
+SWEEP = {sweep}
+SPEC = {spec}
+FOLDER = {folder}
+CASES = {cases}
+
+workdir: FOLDER
+
+localrules: all, tables
+
+rule all:
+    input: "index.html"
+
+rule setting:
+    output: touch("settings/{{case}}.finished")
+    wildcard_constraints: case="[A-Za-z0-9.-]+"
+    threads: {threads}
+    resources: mem_mb={mem_mb}
+    params:
+        command=lambda wildcards, threads, resources: shlex.join(
+            [SWEEP, SPEC, "-o", FOLDER, "--case", wildcards.case, "--threads", str(threads),
+             "--max-memory", str(resources.mem_mb * 3 // 4) + "M", "--quiet"])
+    shell: "{{params.command}} || [ $? -eq 1 ]"
+
+rule tables:
+    input: expand("settings/{{case}}.finished", case=CASES)
+    output: "index.html", "results.csv", "results.jsonl"
+    params: command=shlex.join([SWEEP, SPEC, "-o", FOLDER, "--collect"])
+    shell: "{{params.command}} || [ $? -eq 1 ]"
+'''
+
+
+def text(cases, spec_file, output, program, threads, memory):
+    """The Snakefile. Names of files are absolute: jobs run elsewhere."""
+    names = ",\n         ".join(json.dumps(case.name) for case in cases)
+    return TEMPLATE.format(sweep=json.dumps(program), spec=json.dumps(os.path.abspath(spec_file)),
+                           folder=json.dumps(os.path.abspath(output)), cases=f"[{names}]", threads=threads,
+                           mem_mb=max(memory >> 20, 1))
