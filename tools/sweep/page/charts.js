@@ -48,7 +48,7 @@ class Panel {
     numeric.forEach((column) => made.append(element("option", { value: column, textContent: data.names[column] ?? column })));
     made.value = chosen;
     made.setAttribute("aria-label", axis === "x" ? "across" : "up");
-    made.addEventListener("change", () => this.update());
+    made.addEventListener("change", () => { this.chosenAxes = true; this.update(); });
     return made;
   }
 
@@ -86,6 +86,13 @@ class Panel {
     return points.filter((point) => Number.isFinite(point.x) && Number.isFinite(point.y));
   }
 
+  // What is nearly 0 is shown from 0 on; never less, of what has no sign.
+  fromZero(axis) {
+    const values = this.list.map((point) => point[axis]);
+    const least = Math.min(...values);
+    return values.length > 0 && least >= 0 && least < 0.2 * Math.max(...values);
+  }
+
   scale(axis, column, log) {
     const top = this.tops[axis];
     return {
@@ -94,7 +101,7 @@ class Panel {
         if (top === undefined) return;
         scale.ticks = scale.ticks.filter((tick) => tick.value < top - 0.04 * (scale.max - scale.min)).concat({ value: top });
       },
-      grace: "4%",
+      grace: "4%", min: !log && this.fromZero(axis) ? 0 : undefined,
       ticks: { callback: function (value, index, ticks) {
         if (top !== undefined && Math.abs(value - top) < 1e-9 * Math.abs(top)) return "∞";
         return log ? Chart.Ticks.formatters.logarithmic.call(this, value, index, ticks) : shown(Number(value.toPrecision(6)));
@@ -102,7 +109,16 @@ class Panel {
     };
   }
 
+  // Until an axis is chosen: the first of those wanted that what is shown has values of.
+  usualAxes() {
+    if (this.chosenAxes || !this.plot.wanted) return;
+    const shownRows = visible();
+    const found = this.plot.wanted.find((column) => shownRows.some((row) => number(row[column]) !== undefined));
+    if (found) this.x.value = found;
+  }
+
   update() {
+    this.usualAxes();
     const points = this.list = this.points();
     const [x, y] = [this.x.value, this.y.value];
     const datasets = [];
@@ -159,10 +175,10 @@ function startCharts() {
   }
   Chart.defaults.font.size = 12;
   Chart.defaults.color = "#1b1f24";
-  const time = first(...data.renders.map((name) => `${name}.ms_avg`), "decode_seconds", "encode_seconds");
+  const times = [...data.renders.map((name) => `${name}.ms_avg`), "decode_seconds", "encode_seconds"].filter((name) => numeric.includes(name));
   const plots = [
     { title: "Size and error", x: first("bits_per_voxel", "percent"), y: first("psnr_db", "rmse", "grmse"), log: "" },
-    { title: "Time and error", x: time, y: first("psnr_db", "rmse", "grmse"), log: "" },
+    { title: "Time and error", x: times[0] ?? numeric[0], wanted: times, y: first("psnr_db", "rmse", "grmse"), log: "" },
     ...data.plots.filter((plot) => numeric.includes(plot.x) && numeric.includes(plot.y)),
   ];
   plots.forEach((plot, index) => charts.push(new Panel($("charts"), plot, index)));

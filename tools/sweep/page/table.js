@@ -46,7 +46,8 @@ function line(row, columns) {
 
 function updateTable() {
   const list = visible().sort((a, b) => compareRows(a, b) * (order.down ? -1 : 1));
-  const columns = data.columns.filter((column) => shownColumns.has(column));
+  // Those that only other inputs have values of are left out.
+  const columns = data.columns.filter((column) => shownColumns.has(column) && list.some((row) => shown(row[column]) !== ""));
   const focused = document.activeElement?.closest("tr");
   const again = focused && $("body").contains(focused) ? focused.dataset.row : undefined;
   $("head").replaceChildren(heading(""), ...columns.map(heading));
