@@ -7,8 +7,8 @@
 #include <mutex>
 #include <utility>
 
-#include "formats/parallel.h"
 #include "formats/reservation.h"
+#include "libcolor/surface_batches.h"
 #include "libcolor/voxelise_tile.h"
 
 namespace voxkit::color {
@@ -80,53 +80,14 @@ class MeshSurface : public SurfaceSource {
   }
 
   Status read(Context& ctx, const Sink& sink) override {
-    // A batch of cubes is made while the one before is handed over.
-    const uint64_t tile_bytes = sizeof(SurfaceVoxel) << (3 * tile_bits_);
-    const auto threads = static_cast<uint64_t>(ctx.threads);
-    uint64_t batch = std::clamp(ctx.memory->limit() / 8 / tile_bytes, uint64_t{1}, 32 * threads);
-    Result<Reservation> hold;
-    for (;; batch /= 2) {
-      hold = Reservation::take(threads * TileWork::bytes(tile_bits_) + 2 * batch * tile_bytes, "voxelising",
-                               ctx);
-      if (hold || batch == 1) break;
-    }
-    if (!hold) return tl::unexpected<Error>(hold.error());
-
     Parts parts(scene_, all_, tile_bits_);
-    std::vector<Part> jobs;
-    std::vector<std::vector<SurfaceVoxel>> ready, made;
-    uint64_t last_place = 0;
-    for (bool more = true; more || !ready.empty();) {
-      jobs.clear();
-      while (more && jobs.size() < batch) {
-        Part part;
-        VOX_TRY(more, parts.next(part, ctx));
-        if (more) jobs.push_back(std::move(part));
-      }
-      // Those of two batches ago keep their memory.
-      made.resize(jobs.size());
-      for (auto& voxels : made) voxels.clear();
-      VOX_CHECK(parallel_for(ctx, static_cast<int64_t>(jobs.size()) + 1, [&](int64_t i) -> Status {
-        if (i == 0) return hand_over(ready, sink, last_place);
-        return make(jobs[static_cast<size_t>(i - 1)], made[static_cast<size_t>(i - 1)]);
-      }));
-      ctx.progress(std::ldexp(static_cast<double>(last_place), -3 * all_.bits));
-      std::swap(ready, made);
-    }
-    return {};
+    return read_in_batches<Part>(
+        {tile_bits_, all_.bits, TileWork::bytes(tile_bits_)}, sink, ctx,
+        [&](Part& part) { return parts.next(part, ctx); },
+        [&](const Part& part, auto& out) { return make(part, out); });
   }
 
  private:
-  static Status hand_over(const std::vector<std::vector<SurfaceVoxel>>& ready, const Sink& sink,
-                          uint64_t& last_place) {
-    for (const auto& voxels : ready)
-      if (!voxels.empty()) {
-        VOX_CHECK(sink(voxels));
-        last_place = voxels.back().place;
-      }
-    return {};
-  }
-
   Status make(const Part& part, std::vector<SurfaceVoxel>& out) {
     std::unique_ptr<TileWork> work;
     {

@@ -24,8 +24,8 @@ struct Options {
 
 void declare(CommandLine& line, Options& o) {
   line.argument("INPUT",
-                "Mesh (.obj .gltf .glb .ply), points (.ply), model (.vox), RGBA or RGB volume, built-in such "
-                "as menger:5, or .dagc file",
+                "Mesh (.obj .gltf .glb .ply), points (.ply), model (.vox), RGBA or RGB volume, built-in "
+                "(menger:5, terrain:N, terrain:N:box), or .dagc file",
                 o.input);
   line.text("-o,--output", "OUT", "Output (.dagc), or -", o.output, true);
   line.option("--resolution", "N", "Of a mesh or points: voxels along the longest side (1024)",
@@ -167,6 +167,7 @@ int main(int argc, char** argv) {
       argc, argv, "dagcolor-pack", "Compresses a coloured surface: geometry as a DAG, colours apart from it.",
       "  dagcolor-pack menger:5 -o sponge.dagc\n"
       "  dagcolor-pack house.glb -o house.dagc --resolution 4096\n"
+      "  dagcolor-pack terrain:2048 -o hamlet.dagc\n"
       "  dagcolor-pack model.nrrd -o model.dagc --threshold 6.38 --verify\n"
       "  dagcolor-pack model.nrrd -o model.dagc --codec raw\n"
       "  dagcolor-pack house.glb -o house.dagc --codec bc1 --image-curve hilbert\n",

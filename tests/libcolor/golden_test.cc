@@ -12,6 +12,7 @@
 #include <sstream>
 
 #include "formats/readers.h"
+#include "libcolor/terrain.h"
 #include "libcolor/volume_surface.h"
 #include "tests/damage.h"
 #include "tests/libcolor/color_runs.h"
@@ -30,8 +31,12 @@ std::vector<std::string> split(const std::string& text, char separator) {
   return parts;
 }
 
-/// "menger:4", say, or the name of one of color_runs.h, on the voxels of a sphere.
+/// "menger:4" or "terrain:64", say, or the name of one of color_runs.h, on the voxels of a sphere.
 std::unique_ptr<SurfaceSource> source_of(const std::string& scene) {
+  if (is_terrain(scene)) {
+    auto terrain = open_terrain(scene);
+    return terrain ? std::move(*terrain) : nullptr;
+  }
   if (is_builtin(scene)) {
     auto volume = open_builtin(scene);
     if (!volume) return nullptr;

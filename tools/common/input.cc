@@ -9,6 +9,7 @@
 #include "formats/input_stream.h"
 #include "formats/mapped_file.h"
 #include "formats/readers.h"
+#include "libcolor/terrain.h"
 
 namespace voxkit::cli {
 namespace {
@@ -121,6 +122,9 @@ Result<Input> open_spooled(std::shared_ptr<const MappedFile> file, Context& ctx)
 
 Result<Input> open_input(const std::string& name, const OpenOptions& options, Context& ctx) {
   if (is_compressed(name)) return open_compressed(name, 0, ctx);
+  if (color::is_terrain(name))
+    return fail(ErrorCode::usage, name,
+                "a built-in surface, not a volume: dagcolor-pack makes a .dagc file of it");
   Input input;
   if (name != "-") {
     VOX_TRY(input.source, open_volume(name, options, ctx));

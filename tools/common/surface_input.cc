@@ -1,6 +1,7 @@
 #include "tools/common/surface_input.h"
 
 #include "formats/readers.h"
+#include "libcolor/terrain.h"
 #include "libcolor/volume_surface.h"
 #include "libcolor/voxel_list.h"
 #include "libcolor/voxelise.h"
@@ -26,6 +27,7 @@ Surface open_any(const std::string& name, const SurfaceOptions& options, Context
   }
   if (options.resolution)
     return fail(ErrorCode::usage, name, "--resolution: has voxels already: expected a mesh");
+  if (color::is_terrain(name)) return color::open_terrain(name);
   if (has_ending(name, ".vox")) {
     VOX_TRY(VoxelScene scene, read_magicavoxel(name, ctx));
     return color::surface_of(std::move(scene), ctx);
