@@ -315,6 +315,33 @@ class FailureTest(SweepCase):
         self.assertEqual(self.table()[0]["render.psnr_db_avg"][:1].isdigit() or self.table()[0]["render.psnr_db_avg"] == "inf", True)
 
 
+class OutputTest(SweepCase):
+    def test_standard_output_is_full(self):
+        for arguments in (["--help"], ["--version"], [self.spec(), "-o", str(self.out), "--dry-run"]):
+            with open("/dev/full", "wb") as full:
+                done = subprocess.run([str(BIN / "vox-sweep"), *arguments], stdout=full, stderr=subprocess.PIPE, text=True, check=False)
+            self.assertEqual((done.returncode, done.stderr), (4, "vox-sweep: standard output: No space left on device\n"))
+
+    def test_disk_is_full(self):
+        """A table that cannot be written is an error; the old one stays."""
+        spec = self.spec({"inputs": ["sphere:8"], "codecs": [{"tool": "svmm-encode"}]})
+        self.sweep("--quiet", spec=spec)
+        old = (self.out / "results.csv").read_bytes()
+        limited = f"ulimit -f 8; exec {BIN / 'vox-sweep'} {spec} -o {self.out} --quiet"
+        done = subprocess.run(["bash", "-c", limited], capture_output=True, text=True, check=False)
+        self.assertEqual((done.returncode, done.stderr.count("\n")), (4, 1), done.stderr)
+        self.assertIn("File too large", done.stderr)
+        self.assertEqual((self.out / "results.csv").read_bytes(), old)
+        self.assertEqual([path.name for path in self.out.glob(".*")], [".lock"])
+
+    def test_figures(self):
+        """The specs of scripts/figures are good ones."""
+        specs = sorted((pathlib.Path(__file__).resolve().parents[2] / "scripts" / "figures").glob("*.json"))
+        self.assertGreater(len(specs), 2)
+        for spec in specs:
+            self.assertGreater(json.loads(self.sweep("--dry-run", "--json", spec=spec).stdout)["settings"], 10)
+
+
 class BestTest(SweepCase):
     def test_against_the_table(self):
         self.sweep("--quiet")
@@ -361,8 +388,8 @@ class SpecTest(unittest.TestCase):
         """Any value anywhere is either read, or an error of the file with one line; never a bug."""
         good = {"inputs": ["a", {"name": "b", "input": "c", "options": {"peak": 1}, "reference": "d"}],
                 "codecs": [{"tool": "svmm-encode", "name": "n", "options": {"quality": [1, 2]}, "inputs": ["b"]}],
-                "renders": [{"name": "r", "options": {"size": "4x4"}, "inputs": ["a"], "codecs": ["n"]}],
-                "plots": [{"name": "p", "x": "a", "y": "b", "log": "x", "label": ["quality"], "fit": "power"}],
+                "renders": [{"name": "r", "options": {"size": "4x4"}, "inputs": ["a"], "codecs": ["n"], "compare": False}],
+                "plots": [{"name": "p", "x": "a", "y": "b", "log": "x", "label": ["quality"], "fit": "power", "line": "all", "baseline": "c"}],
                 "metrics": {"peak": 3}, "decode": False, "threads": 2, "timeout": 1.5, "keep": True, "title": "t"}
         self.assertEqual(len(self.read(good).codecs[0].settings), 2)
         wrong = [None, True, -1, 10**400, 0.5, "", "x\ny", "-x", "\ud800", [], {}, [[]], {"": {}}, [None], "a" * 1000, {"help": 1}]

@@ -49,7 +49,7 @@ def best(rows, flats, conditions):
                    if rows[i]["input"] == name and "file_bytes" in values and fulfils(values, conditions)]
         if fitting:
             row, values = rows[min(fitting)[1]], flats[min(fitting)[1]]
-            answer |= {"found": True, "codec": row["codec"], "tool": row["encode"]["tool"], "setting": row["setting"],
+            answer |= {"found": True, "codec": row["codec"], "tool": row["encoder"], "setting": row["setting"],
                        "options": row["options"], "case": row["case"], "file_bytes": values["file_bytes"],
                        "percent": values.get("percent"), "values": {column: values[column] for column, _, _ in conditions}}
         answers.append(answer)

@@ -18,6 +18,7 @@ MARK = "sweep.json"  # the file by which a folder of results is known
 
 def main(words, build):
     signals.handle()
+    sys.stdout.reconfigure(errors="backslashreplace")  # of names that are no UTF-8
     try:
         return work(words, build)
     except Failure as failure:
@@ -26,12 +27,10 @@ def main(words, build):
         return report("interrupted: what was done is kept: run it again to go on", 128 + interrupted.number)
     except MemoryError:
         return report("out of memory: use fewer settings", LIMIT)
-    except BrokenPipeError:
-        with contextlib.suppress(OSError):  # or Python complains at its end
-            os.dup2(os.open(os.devnull, os.O_WRONLY), 1)
-        return report("standard output: Broken pipe", OUTPUT)
     except OSError as error:
-        return report(f"{error.filename or 'output'}: {error.strerror or error}", OUTPUT)
+        if error.filename is None:  # of standard output; Python would complain at its end, too
+            os.dup2(os.open(os.devnull, os.O_WRONLY), 1)
+        return report(f"{error.filename or 'standard output'}: {error.strerror or error}", OUTPUT)
     except Exception as error:  # a bug of ours: where, for its report
         where = traceback.extract_tb(error.__traceback__)[-1]
         return report(f"a bug of ours: {type(error).__name__}: {error} ({os.path.basename(where.filename)}:{where.lineno})", BUG)

@@ -86,7 +86,7 @@ def words_of(options):
 
 
 def slug(text):
-    return re.sub(r"[^A-Za-z0-9.]+", "-", text).strip("-.")[:60]
+    return re.sub(r"[^A-Za-z0-9.]+", "-", text).strip("-.")[:60] or "unnamed"
 
 
 def identity(name, folder):
@@ -169,12 +169,14 @@ class Planner:
         if "no-images" not in named:
             ending = "-%04d.png" if "path" in named else ".png"
             target = ["-o", own]
+        if target and render.compare:
             plain = tuple(pair for pair in render.options if pair[0] != "reference-traversal")
             case.references[render.name] = self.step(
                 "reference", "vox-render", [reference, *target, "--json", *given, *words_of(plain)], needs, ending,
                 f"{case.input.name} {render.name}")
-        case.renders[render.name] = self.step("render", "vox-render", [packed, *target, "--reference", reference, *words],
-                                              [case.encode, *needs], ending, f"{title} {render.name}")
+        against, more = (["--reference", reference], needs) if render.compare else ([], [])
+        case.renders[render.name] = self.step("render", "vox-render", [packed, *target, *against, *words],
+                                              [case.encode, *more], ending, f"{title} {render.name}")
 
 
 def cases_of(spec, versions):

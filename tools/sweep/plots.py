@@ -3,10 +3,12 @@ import hashlib
 import io
 import json
 import os
+import statistics
 
 from sweep import table
 from sweep.page import column_names
 from sweep.runner import write_whole
+from sweep.spec import Plot
 
 MADE_OF = ".made-of"  # the file with a digest of the results
 MARKERS = "o^sDvPX*"
@@ -36,16 +38,13 @@ def fresh(spec, flats, folder):
 
 
 def usual_plots(spec, columns):
-    """(name, title, x, y, log x, log y, labels, line, fit) of what every sweep draws, and what its spec asks for."""
+    """What every sweep draws, and what its spec asks for."""
     times = [f"{render.name}.ms_avg" for render in spec.renders] + ["decode_seconds", "encode_seconds"]
-    time = next((name for name in times if name in columns), None)
-    found = []
-    if "psnr_db" in columns:
-        found.append(("size-error", "Size and error", "bits_per_voxel", "psnr_db", False, False, (), True, ""))
-        if time:
-            found.append(("time-error", "Time and error", time, "psnr_db", False, False, (), True, ""))
-    return found + [(plot.name, plot.title, plot.x, plot.y, plot.log_x, plot.log_y, plot.label, plot.line, plot.fit)
-                    for plot in spec.plots]
+    usual = [Plot("size-error", "Size and error", "bits_per_voxel", "psnr_db", False, False, (), "front", "", "")]
+    usual += [Plot("time-error", "Time and error", time, "psnr_db", False, False, (), "front", "", "") for time in times
+              if time in columns][:1]
+    asked = {(table.find_column(plot.x, columns), table.find_column(plot.y, columns)) for plot in spec.plots}
+    return [plot for plot in usual if plot.y in columns and (plot.x, plot.y) not in asked] + list(spec.plots)
 
 
 def write(spec, flats, folder):
@@ -57,15 +56,15 @@ def write(spec, flats, folder):
     names, unknown = column_names(columns), []
     os.makedirs(folder, exist_ok=True)
     for plot in usual_plots(spec, columns):
-        x, y = table.find_column(plot[2], columns), table.find_column(plot[3], columns)
+        x, y = table.find_column(plot.x, columns), table.find_column(plot.y, columns)
         if x is None or y is None:
-            unknown.append(plot[2] if x is None else plot[3])
+            unknown.append(plot.x if x is None else plot.y)
             continue
         for data, figure in figures(plot, x, y, flats, names, columns):
             for ending in ("svg", "png"):
                 file = io.BytesIO()
                 figure.savefig(file, format=ending, dpi=120, metadata={"Date": None} if ending == "svg" else None)
-                write_whole(os.path.join(folder, f"{plot[0]}{data}.{ending}"), file.getvalue())
+                write_whole(os.path.join(folder, f"{plot.name}{data}.{ending}"), file.getvalue())
     if not unknown:
         write_whole(os.path.join(folder, MADE_OF), digest(spec, flats))
     return unknown
@@ -73,8 +72,9 @@ def write(spec, flats, folder):
 
 def figures(plot, x, y, flats, names, columns):
     """(ending of the file's name, figure): one an input; one of all of them where a curve is fitted."""
-    _, title, _, _, log_x, log_y, labels, line, fit = plot
+    labels, fit, baseline = plot.label, plot.fit, table.find_column(plot.baseline, columns)
     inputs = list(dict.fromkeys(values["input"] for values in flats))
+    endings = dict(zip(inputs, endings_of(inputs)))
     for group in ([inputs] if fit else [[name] for name in inputs]):
         of_group = [values for values in flats if values["input"] in group and finite(values.get(x))]
         points = [values for values in of_group if finite(values.get(y))]
@@ -89,7 +89,9 @@ def figures(plot, x, y, flats, names, columns):
             if own:
                 axes.plot(across, up, marker=MARKERS[index % len(MARKERS)], color=color, label=codec, linestyle="none",
                           markersize=5, alpha=0.85)
-            if line and not fit:
+            if plot.line == "all" and not fit:
+                axes.plot(across, up, color=color, linewidth=1)
+            elif plot.line == "front" and not fit:
                 draw_front(axes, x, y, across, up, color)
             if fit:
                 draw_fit(axes, across, up, color, codec)
@@ -99,11 +101,24 @@ def figures(plot, x, y, flats, names, columns):
             lossless = [table.number(values[x]) for values in exact if values["codec"] == codec]
             if lossless:  # infinitely good: the best of these has a line
                 axes.axvline((max if table.higher_is_better(x) else min)(lossless), color=color, linestyle=":", label=f"{codec}, lossless")
-        axes.set(title=title if fit else f"{title}: {group[0]}", xlabel=names.get(x, x), ylabel=names.get(y, y),
-                 xscale="log" if log_x else "linear", yscale="log" if log_y else "linear")
+        if baseline:
+            known = [table.number(values[baseline]) for values in of_group if finite(values.get(baseline))]
+            if known:
+                axes.axhline(statistics.median(known), color="#2a7a2a", linewidth=1.5, label=names.get(baseline, baseline))
+        axes.set(title=plot.title if fit else f"{plot.title}: {group[0]}", xlabel=names.get(x, x), ylabel=names.get(y, y),
+                 xscale="log" if plot.log_x else "linear", yscale="log" if plot.log_y else "linear")
         axes.grid(alpha=0.3)
         axes.legend(fontsize=8)
-        yield "" if fit or len(inputs) == 1 else "-" + "".join(c if c.isalnum() or c in ".-" else "-" for c in group[0]), figure
+        yield "" if fit else endings[group[0]], figure
+
+
+def endings_of(inputs):
+    """What an input adds to the names of files: nothing if there is one only, and never the same as another."""
+    used = []
+    for name in inputs:
+        ending = "-" + "".join(c if c.isalnum() or c in ".-" else "-" for c in name)
+        used.append("" if len(inputs) == 1 else ending if ending not in used else f"{ending}-{len(used)}")
+    return used
 
 
 def new_figure():

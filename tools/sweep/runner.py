@@ -38,6 +38,12 @@ def pictures(step, work):
     return os.path.join(work, step.output.replace("%04d", "0000"))
 
 
+def is_record(value):
+    if not isinstance(value, dict) or not isinstance(value.get("exit_code"), int) or not isinstance(value.get("seconds"), (int, float)):
+        return False
+    return isinstance(value.get("result"), dict) if value.get("status") == "done" else isinstance(value.get("error"), str)
+
+
 class Records:
     """What is known of steps: records of this folder."""
 
@@ -53,8 +59,7 @@ class Records:
             try:
                 with open(self.path(step), encoding="utf-8") as file:
                     record = json.load(file)
-                good = isinstance(record, dict) and record.get("status") in ("done", "failed")
-                self.known[step.name] = record if good else None
+                self.known[step.name] = record if is_record(record) else None
             except (OSError, ValueError):
                 return None
         return self.known[step.name]
@@ -170,6 +175,7 @@ class Runner:
         self.finished = self.total - len(self.waiting)
         with signals.deferred():
             self.loop()
+        signals.check()
         for step in steps.values():
             self.remove_served(step)
 

@@ -41,6 +41,7 @@ class Render:
     options: tuple
     inputs: frozenset
     codecs: frozenset
+    compare: bool       # with the picture of the original
 
 
 @dataclasses.dataclass(frozen=True)
@@ -52,8 +53,9 @@ class Plot:
     log_x: bool
     log_y: bool
     label: tuple        # options whose values stand beside points
-    line: bool          # joins the points of a codec that none of its others beats
+    line: str           # "front": joins the points of a codec that none of its others beats; "all" of them; "none"
     fit: str            # "" or "power": y = a x^b through all points of a codec
+    baseline: str       # "", or a column whose median is shown beside y
 
 
 @dataclasses.dataclass(frozen=True)
@@ -245,8 +247,16 @@ def named(top, place, things):
 
 def checked_name(place):
     name = place.text()
-    if len(name) > 100 or re.search(r"[<>=,]", name) or name.strip() != name:
-        place.fail("expected a name of at most 100 characters, without < > = and commas")
+    if len(name) > 100 or name.strip() != name:
+        place.fail("expected a name of at most 100 characters")
+    return name
+
+
+def column_name(place):
+    """As part of the name of a column, which conditions name."""
+    name = checked_name(place)
+    if re.search(r"[<>=,]", name):
+        place.fail("expected a name without < > = and commas")
     return name
 
 
@@ -272,7 +282,7 @@ def default_name(file):
     """menger:3 is its own name, volumes/head.nii.gz is head."""
     base = os.path.basename(file.rstrip("/")) or file
     stem = base if ":" in base else re.sub(r"(\.gz)?$", "", base).rsplit(".", 1)[0]
-    return re.sub(r"[<>=]", "_", (stem or base).replace(",", "x"))[:100]
+    return (stem or base)[:100]
 
 
 def read_codec(place, inputs, option_names):
@@ -306,8 +316,8 @@ def read_names(keys, key, things):
 
 def read_renders(place, inputs, codecs, option_names):
     """One for each combination of its options."""
-    keys = place.members(["name", "options", "inputs", "codecs"])
-    name = checked_name(keys["name"]) if "name" in keys else "render"
+    keys = place.members(["name", "options", "inputs", "codecs", "compare"])
+    name = column_name(keys["name"]) if "name" in keys else "render"
     grid = [()]
     if "options" in keys:
         grid = read_grid(keys["options"], option_names("vox-render"), OURS_OF_RENDERS, "vox-render")
@@ -315,7 +325,7 @@ def read_renders(place, inputs, codecs, option_names):
     for setting in grid:
         ending = "".join(f" {key}={value}" for key, value in setting if (key, value) in varied)
         yield Render(name + re.sub(r"[<>=,/]", "-", ending), setting, read_names(keys, "inputs", inputs),
-                     read_names(keys, "codecs", codecs))
+                     read_names(keys, "codecs", codecs), keys["compare"].boolean() if "compare" in keys else True)
 
 
 def read_metrics(place, option_names):
@@ -366,7 +376,7 @@ def option_value(place):
 def read_plots(place):
     names = []
     for item in place.items():
-        keys = item.members(["name", "title", "x", "y", "log", "label", "line", "fit"], ["name", "x", "y"])
+        keys = item.members(["name", "title", "x", "y", "log", "label", "line", "fit", "baseline"], ["name", "x", "y"])
         name = keys["name"].text()
         if not re.fullmatch(r"[A-Za-z0-9][A-Za-z0-9._-]{0,99}", name) or name in names:
             keys["name"].fail("expected a name of letters, digits, dots and dashes that no other has, for files")
@@ -374,8 +384,11 @@ def read_plots(place):
         log = keys["log"].value if "log" in keys else ""
         if log not in ("", "x", "y", "xy"):
             keys["log"].fail("expected x, y or xy")
+        line = keys["line"].value if "line" in keys else "front"
+        if line not in ("front", "all", "none"):
+            keys["line"].fail("expected front, all or none")
         if "fit" in keys and keys["fit"].value != "power":
             keys["fit"].fail("expected power")
         yield Plot(name, keys["title"].text() if "title" in keys else name, keys["x"].text(), keys["y"].text(),
                    "x" in log, "y" in log, tuple(label.text() for label in keys["label"].items()) if "label" in keys else (),
-                   keys["line"].boolean() if "line" in keys else True, "power" if "fit" in keys else "")
+                   line, "power" if "fit" in keys else "", keys["baseline"].text() if "baseline" in keys else "")

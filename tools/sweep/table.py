@@ -30,7 +30,7 @@ def rows_of(cases, records, build, machine):
         found = [records.find(step) for step in steps]
         errors = [record["error"] for record in found if record and record["status"] == "failed"]
         row = {"schema": 1, "tool": "vox-sweep", "version": build.text(), "case": case.name, "input": case.input.name,
-               "codec": case.codec.name, "setting": case.setting(), "options": dict(case.options),
+               "codec": case.codec.name, "encoder": case.codec.tool, "setting": case.setting(), "options": dict(case.options),
                "status": "failed" if errors else "done" if None not in found else "missing",
                "error": errors[0] if errors else None, "pareto": False,
                "encode": result(records, case.encode), "decode": result(records, case.decode),
@@ -135,6 +135,8 @@ def jsonl_text(rows):
 
 def find_column(name, columns):
     """The column that is meant: its own name, or a part that only one has, such as psnr for psnr_db; None if there is none."""
+    if not name:
+        return None
     for candidate in (name, f"{name}_db", f"param.{name}"):
         if candidate in columns:
             return candidate

@@ -129,7 +129,7 @@ class Panel {
     });
     const single = new Set(points.map((point) => point.row.input)).size <= 1;
     const front = new Set(single ? frontOf(points, !higherIsBetter(x), !higherIsBetter(y)) : []);
-    if (front.size > 1)
+    if (front.size > 1 && (this.plot.line ?? "front") === "front")
       datasets.push({ label: "Pareto front", data: [...front].sort((a, b) => a.x - b.x).map(({ x: a, y: b }) => ({ x: a, y: b })), showLine: true,
         pointRadius: 0, pointHitRadius: 0, borderColor: "#57606a", borderDash: [6, 4], borderWidth: 2, pointStyle: "line", order: 9 });
     groups.forEach((group, name) => {
@@ -141,6 +141,12 @@ class Panel {
         borderWidth: isChosen.map((chosen) => (chosen ? 3 : 1.5)),
         pointRadius: group.map((_, i) => (isChosen[i] ? 10 : isFront[i] ? 7 : 4.5)), pointHoverRadius: 9, pointHitRadius: 10 });
     });
+    if (this.plot.line === "all")
+      datasets.forEach((dataset) => { if (dataset.label !== "Pareto front") dataset.data.sort((a, b) => a.x - b.x), dataset.showLine = true, dataset.borderWidth = 1.5; });
+    const base = this.plot.baseline ? visible().map((row) => number(row[this.plot.baseline])).filter(Number.isFinite).sort((a, b) => a - b) : [];
+    if (base.length && points.length && y === this.plot.y)
+      datasets.push({ label: data.names[this.plot.baseline] ?? this.plot.baseline, showLine: true, pointRadius: 0, pointHitRadius: 0, pointStyle: "line",
+        borderColor: "#2a7a2a", data: [Math.min, Math.max].map((end) => ({ x: end(...points.map((point) => point.x)), y: base[base.length >> 1] })) });
     this.chart.data.datasets = datasets;
     this.chart.options.scales = { x: this.scale("x", x, this.log[0].checked), y: this.scale("y", y, this.log[1].checked) };
     this.chart.update();
@@ -179,7 +185,13 @@ function startCharts() {
   const plots = [
     { title: "Size and error", x: first("bits_per_voxel", "percent"), y: first("psnr_db", "rmse", "grmse"), log: "" },
     { title: "Time and error", x: times[0] ?? numeric[0], wanted: times, y: first("psnr_db", "rmse", "grmse"), log: "" },
-    ...data.plots.filter((plot) => numeric.includes(plot.x) && numeric.includes(plot.y)),
   ];
+  // Those that the spec asks for, but for what is there already.
+  const usual = plots.map((plot) => `${plot.x} ${plot.y}`);
+  data.plots.filter((plot) => numeric.includes(plot.x) && numeric.includes(plot.y)).forEach((plot) => {
+    const at = usual.indexOf(`${plot.x} ${plot.y}`);
+    if (at < 0) plots.push(plot);
+    else plots[at] = { ...plots[at], ...plot };
+  });
   plots.forEach((plot, index) => charts.push(new Panel($("charts"), plot, index)));
 }
