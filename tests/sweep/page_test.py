@@ -22,7 +22,8 @@ SPEC = {"title": HOSTILE, "inputs": ["menger:2", {"name": "a 'sphere' & more", "
         "codecs": [{"tool": "svmm-encode", "name": "svmm", "options": {"quality": [50, 85, 100], "blockwidth": ["2", "x"], "rootwidth": 2}},
                    {"tool": "vq-encode", "name": "vq", "inputs": ["a 'sphere' & more"], "options": {"reduce": [2, 8]}}],
         "renders": [{"name": "view", "options": {"size": "200x150"}}],
-        "plots": [{"name": "levels", "title": "Levels and size", "x": "levels", "y": "percent", "log": "y"}]}
+        "plots": [{"name": "levels", "title": "Levels and size", "x": "levels", "y": "percent", "log": "y"},
+                  {"name": "joined", "title": "Joined", "x": "quality", "y": "psnr", "line": "all", "baseline": "view.ms_avg"}]}
 WIDTHS = {390: 844, 1280: 900}
 
 
@@ -114,7 +115,7 @@ class PageTest(unittest.TestCase):
         self.assertEqual(self.find("h1")[0].text, HOSTILE)
         self.assertEqual(self.driver.title, HOSTILE)
         self.assertEqual(self.script("return performance.getEntriesByType('resource').filter(e => !e.name.startsWith('data:')).length"), 0)
-        self.assertEqual(len(self.find("canvas")), 3)
+        self.assertEqual(len(self.find("canvas")), 4)
         self.assertIn(f"{sum(row['status'] == 'failed' for row in self.table)} failed", self.find("#summary")[0].text)
         for canvas in self.find("canvas"):
             box = canvas.rect
@@ -216,6 +217,16 @@ class PageTest(unittest.TestCase):
         self.assertEqual(self.script("return charts[1].chart.scales.x.options.title.text"), "bytes")
         self.keys(self.find("#chart-1 .check input")[0], "SPACE")
         self.assertEqual(self.script("return charts[1].chart.scales.x.type"), "logarithmic")
+
+    def test_joined_points(self):
+        """A plot that joins all points has them from left to right, no front, and the median of its baseline."""
+        sets = self.script("return charts[3].chart.data.datasets.map(d => [d.label, Boolean(d.showLine), d.data.map(p => [p.x, p.y])])")
+        self.assertEqual([name for name, _, _ in sets], ["svmm", "view: ms a frame"])
+        self.assertTrue(all(joined for _, joined, _ in sets))
+        across = [x for x, _ in sets[0][2]]
+        self.assertEqual(across, [50, 85, 100])
+        times = sorted(float(row["view.ms_avg"]) for row in self.table if row["input"] == "menger:2" and row["view.ms_avg"])
+        self.assertEqual([y for _, y in sets[1][2]], [times[1]] * 2)
 
     def test_slider(self):
         for image in self.find("#before, #after"):

@@ -119,7 +119,8 @@ class Panel {
 
   update() {
     this.usualAxes();
-    const points = this.list = this.points();
+    const points = this.list = this.points().sort((a, b) => a.x - b.x || a.y - b.y);
+    const withFront = (this.plot.line ?? "front") === "front";
     const [x, y] = [this.x.value, this.y.value];
     const datasets = [];
     const groups = new Map();
@@ -128,8 +129,8 @@ class Panel {
       groups.set(name, [...(groups.get(name) ?? []), point]);
     });
     const single = new Set(points.map((point) => point.row.input)).size <= 1;
-    const front = new Set(single ? frontOf(points, !higherIsBetter(x), !higherIsBetter(y)) : []);
-    if (front.size > 1 && (this.plot.line ?? "front") === "front")
+    const front = new Set(single && withFront ? frontOf(points, !higherIsBetter(x), !higherIsBetter(y)) : []);
+    if (front.size > 1)
       datasets.push({ label: "Pareto front", data: [...front].sort((a, b) => a.x - b.x).map(({ x: a, y: b }) => ({ x: a, y: b })), showLine: true,
         pointRadius: 0, pointHitRadius: 0, borderColor: "#57606a", borderDash: [6, 4], borderWidth: 2, pointStyle: "line", order: 9 });
     groups.forEach((group, name) => {
@@ -142,7 +143,7 @@ class Panel {
         pointRadius: group.map((_, i) => (isChosen[i] ? 10 : isFront[i] ? 7 : 4.5)), pointHoverRadius: 9, pointHitRadius: 10 });
     });
     if (this.plot.line === "all")
-      datasets.forEach((dataset) => { if (dataset.label !== "Pareto front") dataset.data.sort((a, b) => a.x - b.x), dataset.showLine = true, dataset.borderWidth = 1.5; });
+      datasets.forEach((dataset) => Object.assign(dataset, { showLine: true, borderWidth: 1.5, borderColor: dataset.borderColor.find((line) => line !== "#000") ?? "#000" }));
     const base = this.plot.baseline ? visible().map((row) => number(row[this.plot.baseline])).filter(Number.isFinite).sort((a, b) => a - b) : [];
     if (base.length && points.length && y === this.plot.y)
       datasets.push({ label: data.names[this.plot.baseline] ?? this.plot.baseline, showLine: true, pointRadius: 0, pointHitRadius: 0, pointStyle: "line",
@@ -150,13 +151,12 @@ class Panel {
     this.chart.data.datasets = datasets;
     this.chart.options.scales = { x: this.scale("x", x, this.log[0].checked), y: this.scale("y", y, this.log[1].checked) };
     this.chart.update();
-    this.list.sort((a, b) => a.x - b.x || a.y - b.y);
     this.canvas.setAttribute("aria-label", `${this.plot.title}: ${data.names[y] ?? y} over ${data.names[x] ?? x}, ${points.length} settings. ` +
       "Arrow keys go from point to point, Enter shows the picture.");
     const chosen = this.list.find((point) => point.row === state.chosen);
     const best = [...front].map((point) => point.row);
     this.told.textContent = chosen ? this.describe(chosen.row).join(", ")
-      : points.length === 0 ? "No setting has both." : `${points.length} settings` + (single ? `, ${best.length} on the front.` : ". Choose one input to see its front.");
+      : points.length === 0 ? "No setting has both." : `${points.length} settings` + (!withFront ? "." : single ? `, ${best.length} on the front.` : ". Choose one input to see its front.");
   }
 
   key(event) {
