@@ -108,6 +108,13 @@ Status validate(const Options& options);
 /// colours; with Colors::all or along a Hilbert curve, all colours, twice; with palette, all colours. What is
 /// written does not depend on ctx.threads.
 Result<Report> encode(SurfaceSource& source, const Options& options, const ByteSink& sink, Context& ctx);
+/// The bytes of a part of so many colours as the codec stores them, where they are known; its colours in the
+/// source are then those that they stand for. Called from any thread.
+using StoredPart =
+    std::function<Result<std::optional<std::vector<std::byte>>>(uint64_t part, uint32_t colors)>;
+/// The same with parts that are encoded already: of bc1, bc7, astc, jpeg, jp2 or png.
+Result<Report> encode(SurfaceSource& source, const Options& options, const StoredPart& stored,
+                      const ByteSink& sink, Context& ctx);
 
 /// A compressed surface, opened for random access. Safe on any bytes: every operation returns an error or a
 /// well-formed answer. The DAG is verified when it is first used, colours part by part. Of images, the first
@@ -119,6 +126,14 @@ class Volume {
   static Result<std::shared_ptr<const Volume>> open(std::shared_ptr<const Container> container,
                                                     MemoryBudget* memory = nullptr);
   ~Volume();
+
+  /// The colours of a part, as many as it has.
+  using PartColors = std::function<Result<std::vector<Rgb>>(uint64_t part)>;
+  /// The same voxels with other colours, under the same numbers. `colors` is called when a part is first
+  /// used, from any thread, and takes `work_bytes`; what it gives counts against `memory`. Both must outlive
+  /// the volume.
+  Result<std::shared_ptr<const Volume>> recolored(PartColors colors, uint64_t work_bytes,
+                                                  MemoryBudget& memory) const;
 
   /// Voxels are rgba32: opaque where there is one, else void.
   const VolumeInfo& info() const { return info_; }

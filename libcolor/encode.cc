@@ -28,8 +28,8 @@ double seconds_since(Clock::time_point start) {
 /// Encodes and writes colours in their order, some parts at a time.
 class ColorWriter {
  public:
-  ColorWriter(const Options& options, ContainerWriter& container, Context& ctx)
-      : options_(options), container_(container), ctx_(ctx), reservation_(*ctx.memory) {}
+  ColorWriter(const Options& options, const StoredPart& stored, ContainerWriter& container, Context& ctx)
+      : options_(options), stored_(stored), container_(container), ctx_(ctx), reservation_(*ctx.memory) {}
 
   Status begin() {
     batch_ = static_cast<size_t>(2 * ctx_.threads);
@@ -66,7 +66,7 @@ class ColorWriter {
     VOX_CHECK(parallel_for(ctx_, static_cast<int64_t>(count), [&](int64_t i) -> Status {
       const auto part = static_cast<uint64_t>(i);
       const auto own = std::span(colors_).subspan(part << part_log2, colors_of_part(colors_.size(), part));
-      VOX_TRY(encoded[part], encode(own));
+      VOX_TRY(encoded[part], stored_or_encoded(next_part_ + part, own));
       return {};
     }));
     for (const EncodedPart& part : encoded) {
@@ -79,6 +79,17 @@ class ColorWriter {
     colors_.clear();
     seconds += seconds_since(start);
     return {};
+  }
+  Result<EncodedPart> stored_or_encoded(uint64_t number, std::span<const Rgb> colors) const {
+    if (!stored_) return encode(colors);
+    const auto count = static_cast<uint32_t>(colors.size());
+    VOX_TRY(auto known, stored_(number, count));
+    if (!known) return encode(colors);
+    EncodedPart part;
+    part.bytes = std::move(*known);
+    if (makes_textures(options_.codec))
+      part.blocks = TextureLayout(options_.image_curve, block_size_of(options_), count).blocks();
+    return part;
   }
   Result<EncodedPart> encode(std::span<const Rgb> colors) const {
     if (makes_images(options_.codec)) return encode_as_image(colors, options_);
@@ -96,6 +107,7 @@ class ColorWriter {
   }
 
   const Options& options_;
+  const StoredPart& stored_;
   ContainerWriter& container_;
   Context& ctx_;
   Reservation reservation_;
@@ -139,6 +151,11 @@ Status validate(const Options& o) {
 }
 
 Result<Report> encode(SurfaceSource& source, const Options& options, const ByteSink& sink, Context& ctx) {
+  return encode(source, options, {}, sink, ctx);
+}
+
+Result<Report> encode(SurfaceSource& source, const Options& options, const StoredPart& stored,
+                      const ByteSink& sink, Context& ctx) {
   VOX_CHECK(validate(options));
   const auto start = Clock::now();
   const VolumeInfo& info = source.info();
@@ -148,7 +165,7 @@ Result<Report> encode(SurfaceSource& source, const Options& options, const ByteS
   ContainerWriter container(sink, Codec::color);
   VOX_CHECK(container.add(volume_info_kind, 0, 0, pack_volume_info(info)));
 
-  ColorWriter colors(options, container, ctx);
+  ColorWriter colors(options, stored, container, ctx);
   VOX_CHECK(colors.begin());
   DagBuilder builder(height, ctx);
   const bool all = options.colors == Colors::all, reorder = all || options.curve != Curve::morton;

@@ -116,8 +116,7 @@ const std::byte* Store::verify(uint64_t number, const Container& container) cons
 
 void Store::decode_images(const Container& container, const Params& params, MemoryBudget& memory) {
   if (!makes_images(params.codec)) return;
-  decoded_ = std::make_unique<DecodedParts>(
-      parts_.size(), memory, image_part_work_bytes(params.codec),
+  decode_parts(
       [&](uint64_t number) -> Result<std::vector<Rgb>> {
         VOX_TRY(const auto bytes, container.chunk(parts_[number]));
         auto colors = decode_as_image(bytes, params.codec, params.image_curve,
@@ -126,7 +125,12 @@ void Store::decode_images(const Container& container, const Params& params, Memo
           return fail(colors.error().code, container.name(),
                       fmt::format("chunk COLR 0.{}: {}", number, colors.error().what));
         return colors;
-      });
+      },
+      image_part_work_bytes(params.codec), memory);
+}
+
+void Store::decode_parts(DecodedParts::Decode decode, uint64_t work_bytes, MemoryBudget& memory) {
+  decoded_ = std::make_unique<DecodedParts>(parts_.size(), memory, work_bytes, std::move(decode));
 }
 
 std::shared_ptr<const DecodedParts::Part> Store::decoded(uint64_t number) const {

@@ -18,8 +18,10 @@ class Store {
  public:
   /// Finds the chunks that follow from the parameters, and no others; verifies the palette.
   Status find_chunks(const Container& container, const Params& params);
-  /// Of images: what parts are decoded by. Both arguments must outlive the store.
+  /// Of images: what parts are decoded by. The arguments must outlive the store.
   void decode_images(const Container& container, const Params& params, MemoryBudget& memory);
+  /// Colours of parts come from `decode`, whatever the codec.
+  void decode_parts(DecodedParts::Decode decode, uint64_t work_bytes, MemoryBudget& memory);
   /// The DAG, all of which is verified now.
   Result<const DagView*> dag(const Container& container, const Params& params) const;
   /// The bytes of a part of the colours; null if it is damaged, which `status` then tells.

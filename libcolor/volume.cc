@@ -87,6 +87,18 @@ Result<std::shared_ptr<const Volume>> Volume::open(std::shared_ptr<const Contain
   return volume;
 }
 
+Result<std::shared_ptr<const Volume>> Volume::recolored(PartColors colors, uint64_t work_bytes,
+                                                        MemoryBudget& memory) const {
+  std::shared_ptr<Volume> volume(new Volume);
+  volume->container_ = container_;
+  volume->info_ = info_;
+  volume->params_ = params_;
+  volume->store_ = std::make_unique<Store>();
+  VOX_CHECK(volume->store_->find_chunks(*container_, params_));
+  volume->store_->decode_parts(std::move(colors), work_bytes, memory);
+  return volume;
+}
+
 Result<Rgb> Volume::color(uint64_t index) const {
   if (index >= params_.color_count) return fail(ErrorCode::internal, container_->name(), "no such color");
   ColorReader reader(*store_, *container_, params_);

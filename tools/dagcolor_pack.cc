@@ -8,12 +8,13 @@
 #include "tools/common/color_report.h"
 #include "tools/common/encoding.h"
 #include "tools/common/surface_input.h"
+#include "tools/common/tiles.h"
 
 namespace voxkit::cli {
 namespace {
 
 struct Options {
-  std::string input, output;
+  std::string input, output, tiles;
   SurfaceOptions surface;
   std::string kind = "thin", codec = "vws", image_curve = "morton", curve = "morton", colors = "leaf",
               counts = "node";
@@ -70,6 +71,10 @@ void declare(CommandLine& line, Options& o) {
               one_of(o.colors, {"leaf", "all"}));
   line.option("--counts", "WHERE", "node: counts in nodes; pointer: beside pointers, larger, faster (node)",
               one_of(o.counts, {"node", "pointer"}));
+  line.text("--tiles", "PATTERN",
+            "Of a .dagc file: take the colours from the images that vox-decode --tiles wrote of it, such as "
+            "tile-%04d.png; where codec and ending agree they are stored as they are",
+            o.tiles);
   line.flag(
       "--verify",
       "Decode and compare before the output appears; exit 1 if the promised bound, or what encoding found "
@@ -112,30 +117,41 @@ Json json_of(const Encoding& encoding, const Run& run, const color::Report& repo
   return json;
 }
 
+/// What is encoded, and what is already.
+Result<TiledSurface> open_what(const Options& o, const color::Options& options, Context& ctx) {
+  if (!o.tiles.empty()) {
+    if (o.surface.resolution) return bad_usage("--resolution: tiles are of voxels: leave it out");
+    return open_tiled(o.input, o.tiles, options, ctx);
+  }
+  SurfaceOptions surface = o.surface;
+  surface.kind = o.kind == "thin" ? color::SurfaceKind::thin : color::SurfaceKind::conservative;
+  TiledSurface opened;
+  VOX_TRY(opened.source, open_surface(o.input, surface, ctx));
+  return opened;
+}
+
 Result<int> work(const Options& o, Run& run) {
   VOX_CHECK(check_encoding(o.input, o.output, o.verify, run));
   const color::Options options = encoder_options(o);
   VOX_CHECK(color::validate(options));
-  SurfaceOptions surface = o.surface;
-  surface.kind = o.kind == "thin" ? color::SurfaceKind::thin : color::SurfaceKind::conservative;
   run.stage("read");
-  VOX_TRY(auto source, open_surface(o.input, surface, run.ctx));
-  const VolumeInfo info = source->info();
+  VOX_TRY(TiledSurface opened, open_what(o, options, run.ctx));
+  const VolumeInfo info = opened.source->info();
   VOX_TRY(auto out, OutputFile::create(o.output, run.options.force));
   run.stage("encode");
   const double start = run.seconds();
-  VOX_TRY(const color::Report report,
-          color::encode(
-              *source, options, [&](auto bytes) { return out->write(bytes); }, run.ctx));
+  VOX_TRY(const color::Report report, color::encode(
+                                          *opened.source, options, opened.stored,
+                                          [&](auto bytes) { return out->write(bytes); }, run.ctx));
   const color::Params& p = report.params;
   const Encoding encoding{o.input, o.output, info, out->position(), run.seconds() - start, {}};
 
   std::optional<color::SurfaceDiff> diff;
   if (o.verify) {
     run.stage("verify");
-    VOX_TRY(source, open_surface(o.input, surface, run.ctx));
+    VOX_TRY(opened, open_what(o, options, run.ctx));
     VOX_TRY(const Input decoded, open_compressed(out->temporary(), 0, run.ctx));
-    VOX_TRY(diff, color::compare(*source, *decoded.color, run.ctx));
+    VOX_TRY(diff, color::compare(*opened.source, *decoded.color, run.ctx));
     const double bound = color::has_threshold(p.codec) ? p.threshold : report.most_error;
     if (!diff->same_voxels || diff->max_distance > bound) {
       cli::report(run.tool,
@@ -170,6 +186,7 @@ int main(int argc, char** argv) {
       "  dagcolor-pack terrain:2048 -o hamlet.dagc\n"
       "  dagcolor-pack model.nrrd -o model.dagc --threshold 6.38 --verify\n"
       "  dagcolor-pack model.nrrd -o model.dagc --codec raw\n"
-      "  dagcolor-pack house.glb -o house.dagc --codec bc1 --image-curve hilbert\n",
+      "  dagcolor-pack house.glb -o house.dagc --codec bc1 --image-curve hilbert\n"
+      "  dagcolor-pack house.dagc --tiles tile-%04d.dds -o other.dagc --codec bc7\n",
       [&](CommandLine& line) { declare(line, options); }, [&](Run& run) { return work(options, run); });
 }

@@ -11,6 +11,7 @@
 #include "tools/common/json.h"
 #include "tools/common/main.h"
 #include "tools/common/retype.h"
+#include "tools/common/tiles.h"
 
 namespace voxkit::cli {
 namespace {
@@ -21,6 +22,7 @@ struct Options {
   int level = 0;
   std::optional<TargetType> type;
   std::optional<ValueRange> range;
+  bool tiles = false;
 };
 
 void declare(CommandLine& line, Options& o) {
@@ -32,6 +34,10 @@ void declare(CommandLine& line, Options& o) {
               box(o.roi));
   line.option("--level", "N", "Stop at this mip level; 0: all detail", integer(o.level, 0, 64));
   line.option("--type", "TYPE", "Type of the output: u8 i8 u16 i16 f32 rgba8 bit", target_type(o.type));
+  line.flag("--tiles",
+            "Of a .dagc file: the images of its colours, one for each 2^20; OUT is a pattern such as "
+            "tile-%04d.png (or .jpg .jp2; .dds of bc1 and bc7; .astc of astc)",
+            o.tiles);
   declare_range_option(line, o.range,
                        "Values that a narrower type's ends stand for (default: least and greatest value)");
 }
@@ -73,9 +79,31 @@ Result<int> write_points(const Options& o, const color::Volume& volume, Run& run
   return 0;
 }
 
+Result<int> write_images(const Options& o, Run& run) {
+  if (o.roi || o.type || o.level != 0)
+    return bad_usage("--roi, --type, --level: not of --tiles: leave them out");
+  VOX_TRY(const Input input, open_compressed(o.input, 0, run.ctx));
+  if (!input.color) return fail(ErrorCode::usage, o.input, "--tiles: expected a .dagc file");
+  const double start = run.seconds();
+  VOX_TRY(const uint64_t tiles, write_tiles(*input.color, o.output, run));
+  const double seconds = run.seconds() - start;
+  run.note(fmt::format("{}: {} images in {:.2f} s", o.output, tiles, seconds));
+  if (run.options.json) {
+    Json json = Json::result();
+    json.set("tool", run.tool).set("version", version_text()).set("input", o.input).set("output", o.output);
+    json.set("tiles", tiles).set("color_count", input.color->params().color_count);
+    json.set("decode_seconds", seconds)
+        .set("peak_rss_bytes", peak_rss_bytes())
+        .set("threads", run.options.threads);
+    VOX_CHECK(print(json.text()));
+  }
+  return 0;
+}
+
 Result<int> work(const Options& o, Run& run) {
   if (run.options.json && o.output == "-")
     return bad_usage("--json and the output - both use standard output");
+  if (o.tiles) return write_images(o, run);
   VOX_CHECK(check_distinct(o.input, o.output));
   const bool points = has_ending(o.output, ".ply");
   if (points && (o.roi || o.type))
@@ -136,6 +164,7 @@ int main(int argc, char** argv) {
       "  vox-decode head.vqv -o part.nii.gz --roi 0,0,0,64,64,64\n"
       "  vox-decode head.svmm -o small.nrrd --level 2\n"
       "  vox-decode house.dagc -o house.ply\n"
+      "  vox-decode house.dagc -o tile-%04d.png --tiles\n"
       "  vox-decode head.svmm -o slice-%04d.png --type u8\n",
       [&](CommandLine& line) { declare(line, options); }, [&](Run& run) { return work(options, run); });
 }

@@ -19,6 +19,7 @@
 #include "tools/common/input.h"
 #include "tools/common/json.h"
 #include "tools/common/main.h"
+#include "tools/common/numbered_name.h"
 #include "tools/common/retype.h"
 #include "tools/render_scene.h"
 
@@ -217,16 +218,6 @@ struct Costs {
   }
 };
 
-/// The name of a frame: the pattern's number filled in.
-Result<std::string> frame_name(const std::string& pattern, size_t frame) {
-  const size_t percent = pattern.find('%'), d = pattern.find_first_not_of("0123456789", percent + 1);
-  if (d == std::string::npos || pattern[d] != 'd' || d - percent > 4)
-    return bad_usage("-o " + pattern + ": expected one %d or %04d in the name");
-  const int width = std::atoi(pattern.c_str() + percent + 1);
-  return pattern.substr(0, percent) + fmt::format("{:0{}}", frame, std::max(width, 1)) +
-         pattern.substr(d + 1);
-}
-
 /// Options that do not go with the mode.
 Status check_mode(const Options& o) {
   if (o.mode != "dvr") {
@@ -275,7 +266,7 @@ Result<int> work(const Options& o, Run& run) {
     for (size_t i = 0; i < cameras.size(); ++i) {
       names.push_back(o.output);
       if (pattern) {
-        VOX_TRY(names.back(), frame_name(o.output, i));
+        VOX_TRY(names.back(), numbered_name("-o", o.output, i));
       }
       VOX_CHECK(check_image_output(names.back(), run.options.force));
     }
