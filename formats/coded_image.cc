@@ -26,7 +26,7 @@ const Library& library(ImageFormat format) {
 
 Result<const ModuleTable*> codec(ImageFormat format, ErrorCode missing) {
   const Library& l = library(format);
-  return load_module(module_folder(), {l.module, fmt::format("{} images", l.name), l.package, missing});
+  return load_module(module_folder(), {l.module, fmt::format("a {} image", l.name), l.package, missing});
 }
 
 Result<const ModuleTable*> quantiser() {

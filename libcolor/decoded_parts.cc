@@ -52,21 +52,24 @@ Result<std::shared_ptr<const DecodedParts::Part>> DecodedParts::decode(uint64_t 
 }
 
 bool DecodedParts::forget_one() {
-  uint64_t oldest = ~uint64_t{0};
-  Slot* found = nullptr;
-  for (uint64_t i = 0; i < count_; ++i)
-    if (const uint64_t used = slots_[i].used; used != 0 && used < oldest) {
-      oldest = used;
-      found = &slots_[i];
-    }
-  if (found == nullptr) return false;
-  // A part that is being asked for stays.
-  const std::unique_lock lock(found->mutex, std::try_to_lock);
-  if (!lock || !found->part) return false;
-  found->part.reset();
-  found->used = 0;
-  --kept_;
-  return true;
+  for (uint64_t tried = 0;;) {
+    uint64_t oldest = ~uint64_t{0};
+    Slot* found = nullptr;
+    for (uint64_t i = 0; i < count_; ++i)
+      if (const uint64_t used = slots_[i].used; used > tried && used < oldest) {
+        oldest = used;
+        found = &slots_[i];
+      }
+    if (found == nullptr) return false;
+    tried = oldest;
+    // A part that is being asked for stays.
+    const std::unique_lock lock(found->mutex, std::try_to_lock);
+    if (!lock || !found->part) continue;
+    found->part.reset();
+    found->used = 0;
+    --kept_;
+    return true;
+  }
 }
 
 }  // namespace voxkit::color
