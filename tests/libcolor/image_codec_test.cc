@@ -144,6 +144,25 @@ TEST(DecodedParts, ThoseUsedLongestAgoGoFirst) {
   EXPECT_EQ((*held)->data()[0].r, 0);
 }
 
+/// More threads than there is room for parts.
+TEST(DecodedParts, ThreadsShareLittleRoom) {
+  MemoryBudget memory(uint64_t{40} << 20);
+  DecodedParts parts(64, memory, 1 << 20, two_of);
+  std::vector<std::thread> threads;
+  std::atomic<int> wrong = 0;
+  for (uint64_t t = 0; t < 4; ++t)
+    threads.emplace_back([&, t] {
+      std::mt19937_64 random(t);
+      for (int i = 0; i < 2000; ++i) {
+        const uint64_t number = random() % 64;
+        const auto part = parts.get(number);
+        wrong += !part || (*part)->data()[0].r != number;
+      }
+    });
+  for (std::thread& thread : threads) thread.join();
+  EXPECT_EQ(wrong, 0);
+}
+
 TEST(DecodedParts, WithoutRoomThatIsSaid) {
   MemoryBudget memory(uint64_t{5} << 20);
   DecodedParts parts(3, memory, 1 << 20, two_of);
