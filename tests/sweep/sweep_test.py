@@ -135,6 +135,8 @@ class TablesTest(SweepCase):
         self.assertEqual([row["status"] for row in table], ["done"] * 4)
         self.assertEqual([row["psnr_db"] for row in table[::2]], ["inf", "inf"])
         self.assertEqual([row["dims"] for row in table[1:3]], ["2x2x2", "64x64x64"])
+        for row, cells in zip(self.rows(), table):  # of its voxels, not of the void around them
+            self.assertEqual(float(cells["grmse"]), row["encode"]["grmse"])
 
     def test_side_by_side(self):
         """As many at a time as fit make the same table."""
@@ -142,6 +144,25 @@ class TablesTest(SweepCase):
         beside = self.folder / "beside"
         self.sweep("--quiet", "-j", "2", spec=self.spec(SPEC | {"threads": 1}, "beside.json"), out=beside)
         self.assertEqual(self.lasting(), self.lasting(beside))
+
+    def test_shares(self):
+        """Memory is split between those that run at a time, of which there are no more than threads, and as many."""
+        spec = self.spec({"inputs": ["noise:64:1", "noise:64:2"], "threads": 1, "decode": False, "metrics": False,
+                          "codecs": [{"tool": "vq-encode", "options": {"reduce": [8, 16]}}]})
+        self.sweep("--quiet", "--threads", "2", "--max-memory", "2K", spec=spec, code=1)
+        self.assertIn("allows 1024:", self.table()[0]["error"])
+        for threads in (1, 2):
+            process = subprocess.Popen([str(BIN / "vox-sweep"), spec, "-o", str(self.out), "-q", "-f", "-j", str(threads)])
+            children = pathlib.Path(f"/proc/{process.pid}/task/{process.pid}/children")
+            most = 0
+            while process.poll() is None:
+                try:
+                    running = [pathlib.Path(f"/proc/{child}/cmdline").read_bytes() for child in children.read_text(encoding="ascii").split()]
+                except OSError:
+                    running = []
+                most = max(most, sum(b"--reduce" in words for words in running))
+                time.sleep(0.005)
+            self.assertEqual((process.returncode, most), (0, threads))
 
     def test_yaml(self):
         try:
@@ -389,7 +410,7 @@ class SpecTest(unittest.TestCase):
         good = {"inputs": ["a", {"name": "b", "input": "c", "options": {"peak": 1}, "reference": "d"}],
                 "codecs": [{"tool": "svmm-encode", "name": "n", "options": {"quality": [1, 2]}, "inputs": ["b"]}],
                 "renders": [{"name": "r", "options": {"size": "4x4"}, "inputs": ["a"], "codecs": ["n"], "compare": False}],
-                "plots": [{"name": "p", "x": "a", "y": "b", "log": "x", "label": ["quality"], "fit": "power", "line": "all", "baseline": "c"}],
+                "plots": [{"name": "p", "x": "a", "y": "b", "log": "x", "label": ["quality"], "fit": "power", "line": "all", "baseline": "c", "inputs": ["a"]}],
                 "metrics": {"peak": 3}, "decode": False, "threads": 2, "timeout": 1.5, "keep": True, "title": "t"}
         self.assertEqual(len(self.read(good).codecs[0].settings), 2)
         wrong = [None, True, -1, 10**400, 0.5, "", "x\ny", "-x", "\ud800", [], {}, [[]], {"": {}}, [None], "a" * 1000, {"help": 1}]

@@ -41,9 +41,9 @@ ProctrackType=proctrack/linuxproc
 TaskPlugin=task/none
 JobAcctGatherType=jobacct_gather/none
 SelectType=select/cons_tres
-SelectTypeParameters=CR_Core
+SelectTypeParameters=CR_CPU_Memory
 MpiDefault=none
-NodeName={host} NodeAddr=127.0.0.1 CPUs={cpus} State=UNKNOWN
+NodeName={host} NodeAddr=127.0.0.1 CPUs={cpus} RealMemory=512 State=UNKNOWN
 PartitionName=all Nodes={host} Default=YES MaxTime=INFINITE State=UP
 """
 
@@ -128,9 +128,9 @@ class WorkflowTest(unittest.TestCase):
     def test_slurm(self):
         environment = self.start_slurm()
         out = self.folder / "slurm"
-        self.assertEqual(self.sweep(out, "--snakemake").returncode, 0)
-        self.snakemake(out, "--jobs", "4", "--cluster", "sbatch --parsable --cpus-per-task={threads} --output=/dev/null",
-                       "--latency-wait", "10", **environment)
+        self.assertEqual(self.sweep(out, "--snakemake", "--threads", "2", "--max-memory", "512M").returncode, 0)
+        sbatch = "sbatch --parsable --cpus-per-task={threads} --mem={resources.mem_mb} --output=/dev/null"
+        self.snakemake(out, "--jobs", "4", "--cluster", sbatch, "--latency-wait", "10", **environment)
         self.check_against_whole(out)
 
 

@@ -154,8 +154,9 @@ def write_workflow(options, spec, cases, build, threads, memory):
     if os.path.exists(path) and not options.force:
         raise Failure(OUTPUT, "exists: use --force to overwrite", path)
     prepare(options.output)
-    write_whole(path, workflow.text(cases, options.spec, options.output, os.path.join(build.folder, TOOL),
-                                    min(spec.threads or threads, threads), memory))
+    each = min(spec.threads or threads, threads)
+    write_whole(path, workflow.text(cases, options.spec, options.output, os.path.join(build.folder, TOOL), each,
+                                    memory // max(threads // each, 1)))
     if options.json:
         print_out(json.dumps({"schema": 1, "tool": TOOL, "settings": len(cases), "output": path}, indent=2) + "\n")
     elif not options.quiet:

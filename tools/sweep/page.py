@@ -137,7 +137,7 @@ def page_text(spec, cases, flats, build, machine, work):
         add_pictures([row for row, _ in chosen], [case for _, case in chosen], found)
     plots = [{"title": plot.title, "x": table.find_column(plot.x, columns) or plot.x,
               "y": table.find_column(plot.y, columns) or plot.y, "log": "x" * plot.log_x + "y" * plot.log_y,
-              "baseline": table.find_column(plot.baseline, columns), "line": plot.line}
+              "baseline": table.find_column(plot.baseline, columns), "line": plot.line, "inputs": sorted(plot.inputs)}
              for plot in spec.plots]
     data = {"rows": rows, "columns": [column for column in columns if column != "version"], "names": column_names(columns),
             "usual": usual_columns(flats, columns), "higher": list(table.HIGHER_IS_BETTER), "plots": plots,

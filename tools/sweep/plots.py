@@ -40,8 +40,9 @@ def fresh(spec, flats, folder):
 def usual_plots(spec, columns):
     """What every sweep draws, and what its spec asks for."""
     times = [f"{render.name}.ms_avg" for render in spec.renders] + ["decode_seconds", "encode_seconds"]
-    usual = [Plot("size-error", "Size and error", "bits_per_voxel", "psnr_db", False, False, (), "front", "", "")]
-    usual += [Plot("time-error", "Time and error", time, "psnr_db", False, False, (), "front", "", "") for time in times
+    everything = frozenset(entry.name for entry in spec.inputs)
+    usual = [Plot("size-error", "Size and error", "bits_per_voxel", "psnr_db", False, False, (), "front", "", "", everything)]
+    usual += [Plot("time-error", "Time and error", time, "psnr_db", False, False, (), "front", "", "", everything) for time in times
               if time in columns][:1]
     asked = {(table.find_column(plot.x, columns), table.find_column(plot.y, columns)) for plot in spec.plots}
     return [plot for plot in usual if plot.y in columns and (plot.x, plot.y) not in asked] + list(spec.plots)
@@ -53,7 +54,7 @@ def write(spec, flats, folder):
     matplotlib.use("Agg")
     matplotlib.rcParams["svg.hashsalt"] = "vox-sweep"  # the same file for the same results
     columns = table.columns_of(flats)
-    names, unknown = column_names(columns), []
+    names, unknown, written = column_names(columns), [], set()
     os.makedirs(folder, exist_ok=True)
     for plot in usual_plots(spec, columns):
         x, y = table.find_column(plot.x, columns), table.find_column(plot.y, columns)
@@ -64,7 +65,11 @@ def write(spec, flats, folder):
             for ending in ("svg", "png"):
                 file = io.BytesIO()
                 figure.savefig(file, format=ending, dpi=120, metadata={"Date": None} if ending == "svg" else None)
+                written.add(f"{plot.name}{data}.{ending}")
                 write_whole(os.path.join(folder, f"{plot.name}{data}.{ending}"), file.getvalue())
+    for name in os.listdir(folder):  # those of an earlier spec
+        if name.endswith((".svg", ".png")) and name not in written:
+            os.unlink(os.path.join(folder, name))
     if not unknown:
         write_whole(os.path.join(folder, MADE_OF), digest(spec, flats))
     return unknown
@@ -75,6 +80,7 @@ def figures(plot, x, y, flats, names, columns):
     labels, fit, baseline = plot.label, plot.fit, table.find_column(plot.baseline, columns)
     inputs = list(dict.fromkeys(values["input"] for values in flats))
     endings = dict(zip(inputs, endings_of(inputs)))
+    inputs = [name for name in inputs if name in plot.inputs]
     for group in ([inputs] if fit else [[name] for name in inputs]):
         of_group = [values for values in flats if values["input"] in group and finite(values.get(x))]
         points = [values for values in of_group if finite(values.get(y))]

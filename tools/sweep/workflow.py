@@ -5,7 +5,7 @@ import os
 TEMPLATE = '''# Written by vox-sweep --snakemake: one job for each setting, then the tables and the page.
 #
 #   snakemake --cores 4                                    on this machine
-#   snakemake --slurm --jobs 100                           on Slurm
+#   snakemake --jobs 100 --cluster "sbatch --parsable --cpus-per-task={{threads}} --mem={{resources.mem_mb}}"    on Slurm
 #
 # A setting that fails is marked in the tables; the others go on.
 import shlex
@@ -42,7 +42,8 @@ rule tables:
 
 
 def text(cases, spec_file, output, program, threads, memory):
-    """The Snakefile. Names of files are absolute: jobs run elsewhere."""
+    """The Snakefile. Names of files are absolute: jobs run elsewhere. `threads` and `memory` are those of one job, which
+    gives a quarter of its memory to what is not voxels."""
     names = ",\n         ".join(json.dumps(case.name) for case in cases)
     return TEMPLATE.format(sweep=json.dumps(program), spec=json.dumps(os.path.abspath(spec_file)),
                            folder=json.dumps(os.path.abspath(output)), cases=f"[{names}]", threads=threads,

@@ -73,7 +73,7 @@ class Panel {
   // Points; infinity is drawn a little above the greatest number.
   points() {
     const [x, y] = [this.x.value, this.y.value];
-    const points = visible().map((row) => ({ x: number(row[x]), y: number(row[y]), row }))
+    const points = visible().filter((row) => !this.plot.inputs || this.plot.inputs.includes(row.input)).map((row) => ({ x: number(row[x]), y: number(row[y]), row }))
       .filter((point) => point.x !== undefined && point.y !== undefined && (!this.log[0].checked || point.x > 0) && (!this.log[1].checked || point.y > 0));
     this.tops = {};
     for (const axis of ["x", "y"]) {
@@ -133,7 +133,7 @@ class Panel {
     if (front.size > 1)
       datasets.push({ label: "Pareto front", data: [...front].sort((a, b) => a.x - b.x).map(({ x: a, y: b }) => ({ x: a, y: b })), showLine: true,
         pointRadius: 0, pointHitRadius: 0, borderColor: "#57606a", borderDash: [6, 4], borderWidth: 2, pointStyle: "line", order: 9 });
-    groups.forEach((group, name) => {
+    [...groups].sort(([, a], [, b]) => codecs.indexOf(a[0].row.codec) - codecs.indexOf(b[0].row.codec)).forEach(([name, group]) => {
       const codec = group[0].row.codec;
       const isFront = group.map((point) => front.has(point));
       const isChosen = group.map((point) => point.row === state.chosen);
