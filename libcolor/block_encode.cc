@@ -5,6 +5,7 @@
 
 #include "libcolor/bit_writer.h"
 #include "libcolor/block_plan.h"
+#include "libcolor/lab_colors.h"
 
 namespace voxkit::color {
 namespace {
@@ -19,19 +20,19 @@ class PartWriter {
   PartWriter(Endpoints endpoints, size_t macro_blocks)
       : endpoints_(endpoints), heads_(macro_blocks * macro_head) {}
 
-  void add(const Fitter& fitter, const std::vector<PlannedBlock>& plan) {
+  void add(const MacroColors& colors, const Fitter& fitter, const std::vector<PlannedBlock>& plan) {
     const uint64_t weights = begin_macro_block(0);
     std::vector<uint8_t> run;
     for (const PlannedBlock& block : plan) {
       const uint64_t offset = block.bits == 0 ? no_weights : weights_.size() - weights;
       const uint32_t bits = block.bits == 0 ? 0 : static_cast<uint32_t>(block.bits - 1);
       add_header(block.first | bits << 14 | static_cast<uint32_t>(offset) << 16, block);
-      part_.squared_error += block.fit.squared_error;
-      part_.most_squared = std::max(part_.most_squared, block.fit.most_squared);
-      if (block.bits == 0) continue;
-      run.resize(block.last - block.first);
-      fitter.weights(block.fit, block.first, block.last, block.bits, run.data());
-      for (const uint8_t weight : run) weights_.add(weight, block.bits);
+      if (block.bits > 0) {
+        run.resize(block.last - block.first);
+        fitter.weights(block.fit, block.first, block.last, block.bits, run.data());
+        for (const uint8_t weight : run) weights_.add(weight, block.bits);
+      }
+      add_error(colors, block, run);
     }
   }
   /// A macro block of colours as they are.
@@ -55,6 +56,19 @@ class PartWriter {
   }
 
  private:
+  /// Squared errors are of RGB, wherever distances are measured. `weights`: of a block that has any.
+  void add_error(const MacroColors& colors, const PlannedBlock& block, std::span<const uint8_t> weights) {
+    const uint32_t furthest = std::max(part_.most_squared, block.fit.most_squared);
+    if (colors.space() == ErrorSpace::rgb) {
+      part_.squared_error += block.fit.squared_error;
+    } else {
+      const uint32_t most = block.bits == 0 ? 1 : (1u << block.bits) - 1;
+      for (uint32_t i = block.first; i < block.last; ++i)
+        part_.add_error(colors.color(i),
+                        mix(block.fit.a, block.fit.b, block.bits == 0 ? 0 : weights[i - block.first], most));
+    }
+    part_.most_squared = furthest;
+  }
   uint64_t begin_macro_block(uint64_t flag) {
     std::byte* const head = &heads_[macro_head * macro_blocks_++];
     store_le(head, part_.blocks | flag);
@@ -90,24 +104,32 @@ std::vector<PlannedBlock> plan_of(const MacroColors& colors, const Fitter& fitte
   return merge_greedily(colors, fitter, endpoints, 0, most_weight_bits);
 }
 
+/// The greatest squared distance, in the unit of a Fit.
+uint32_t allowed_of(const BlockOptions& options) {
+  constexpr double greatest = 442;  // no two colours are further apart
+  const double threshold = std::min(options.threshold, greatest);
+  if (options.space == ErrorSpace::rgb) return static_cast<uint32_t>(threshold * threshold);
+  // Where points are not exact the threshold holds none the less.
+  const double within = lab_scale * std::max(0.0, threshold - lab_precision);
+  return static_cast<uint32_t>(within * within);
+}
+
 }  // namespace
 
-Endpoints endpoints_for(double threshold) {
-  constexpr double worst_565 = 6.13;
+Endpoints endpoints_for(double threshold, ErrorSpace space) {
+  const double worst_565 = space == ErrorSpace::rgb ? 6.13 : 5.33;
   return threshold < worst_565 ? Endpoints::rgb888 : Endpoints::rgb565;
 }
 
 EncodedPart encode_part(std::span<const Rgb> colors, const BlockOptions& options) {
-  const Endpoints endpoints = endpoints_for(options.threshold);
-  constexpr double greatest = 442;  // no two colours are further apart
-  const double threshold = std::min(options.threshold, greatest);
-  const auto allowed = static_cast<uint32_t>(threshold * threshold);
+  const Endpoints endpoints = endpoints_for(options.threshold, options.space);
+  const uint32_t allowed = allowed_of(options);
   const size_t macro_blocks = (colors.size() + macro_block_colors - 1) / macro_block_colors;
   PartWriter writer(endpoints, macro_blocks);
   for (size_t m = 0; m < macro_blocks; ++m) {
     const size_t first = m * macro_block_colors;
     const auto own = colors.subspan(first, std::min<size_t>(macro_block_colors, colors.size() - first));
-    const MacroColors macro(own);
+    const MacroColors macro(own, options.space);
     const Fitter fitter(macro, endpoints, allowed, options.effort);
     const std::vector<PlannedBlock> plan = plan_of(macro, fitter, endpoints, options);
     uint64_t cost = 0;
@@ -116,7 +138,7 @@ EncodedPart encode_part(std::span<const Rgb> colors, const BlockOptions& options
     if (cost >= 24 * own.size())
       writer.add_raw(own);
     else
-      writer.add(fitter, plan);
+      writer.add(macro, fitter, plan);
   }
   return writer.finish();
 }

@@ -3,7 +3,7 @@
 #include <algorithm>
 #include <cmath>
 
-#include "libcolor/block_kernel.h"
+#include "libcolor/lab_colors.h"
 
 namespace voxkit::color {
 namespace {
@@ -63,7 +63,8 @@ std::array<float, 3> floats(Rgb c) {
 
 }  // namespace
 
-MacroColors::MacroColors(std::span<const Rgb> colors) : size_(static_cast<uint32_t>(colors.size())) {
+MacroColors::MacroColors(std::span<const Rgb> colors, ErrorSpace space)
+    : size_(static_cast<uint32_t>(colors.size())), space_(space) {
   for (auto& channel : channels_) channel.resize(colors.size() + vector_size);
   prefix_.resize(colors.size() + 1);
   Sums sums{};
@@ -75,6 +76,15 @@ MacroColors::MacroColors(std::span<const Rgb> colors) : size_(static_cast<uint32
     channels_[0][i] = static_cast<float>(r);
     channels_[1][i] = static_cast<float>(g);
     channels_[2][i] = static_cast<float>(b);
+  }
+  if (space != ErrorSpace::lab) return;
+  for (auto& channel : lab_) channel.resize(colors.size() + vector_size);
+  for (size_t i = 0; i < colors.size(); ++i) {
+    // Neighbours are often equal.
+    const LabPoint point = i > 0 && colors[i] == colors[i - 1]
+                               ? LabPoint{lab_[0][i - 1], lab_[1][i - 1], lab_[2][i - 1]}
+                               : lab_colors().point(colors[i]);
+    for (size_t c = 0; c < 3; ++c) lab_[c][i] = point[c];
   }
 }
 
@@ -111,23 +121,39 @@ Fit Fitter::fit(uint32_t first, uint32_t last, int bits) const {
   return bits == 0 ? fit_single(first, last) : fit_line(first, last, bits);
 }
 
+Distances Fitter::distances(const Fit& fit, uint32_t first, uint32_t last, int bits, uint8_t* weights) const {
+  const uint32_t most = bits == 0 ? 1 : (1u << bits) - 1;
+  const BlockKernels& kernels = block_kernels(true);
+  if (colors_.space() == ErrorSpace::rgb)
+    return kernels.distances(run_of(colors_, first, last), floats(fit.a), floats(fit.b),
+                             static_cast<int>(most), allowed_, weights);
+  std::array<LabPoint, 1 << most_weight_bits> steps;
+  const uint32_t count = fit.a == fit.b ? 1 : most + 1;
+  for (uint32_t w = 0; w < count; ++w) steps[w] = lab_colors().point(mix(fit.a, fit.b, w, most));
+  const ColorRun run{
+      {colors_.lab_channel(0) + first, colors_.lab_channel(1) + first, colors_.lab_channel(2) + first},
+      last - first};
+  return kernels.nearest(run, steps.data(), static_cast<int>(count), allowed_, weights);
+}
+
 Fit Fitter::fit_single(uint32_t first, uint32_t last) const {
   const uint32_t count = last - first;
   const MacroColors::Sums s = colors_.sums(first, last);
   const auto mean = [&](size_t c) { return static_cast<uint8_t>((2 * s[c] + count) / (2 * count)); };
   Fit fit;
   fit.a = fit.b = {mean(0), mean(1), mean(2)};
-  // Of all single colours the mean has the least error, but for its rounding.
-  const uint64_t squares = uint64_t{s[3]} + s[4] + s[5];
-  const auto cross = [&](size_t c, uint8_t v) {
-    return uint64_t{v} * (2 * uint64_t{s[c]} - uint64_t{v} * count);
-  };
-  fit.squared_error = squares - cross(0, fit.a.r) - cross(1, fit.a.g) - cross(2, fit.a.b);
   fit.most_squared = allowed_ + 1;
-  if (fit.squared_error > uint64_t{allowed_} * count) return fit;
-  const auto ends = floats(fit.a);
-  const Distances d =
-      block_kernels(true).distances(run_of(colors_, first, last), ends, ends, 1, allowed_, nullptr);
+  if (colors_.space() == ErrorSpace::rgb) {
+    // Of all single colours the mean has the least error, but for its rounding.
+    const uint64_t squares = uint64_t{s[3]} + s[4] + s[5];
+    const auto cross = [&](size_t c, uint8_t v) {
+      return uint64_t{v} * (2 * uint64_t{s[c]} - uint64_t{v} * count);
+    };
+    fit.squared_error = squares - cross(0, fit.a.r) - cross(1, fit.a.g) - cross(2, fit.a.b);
+    if (fit.squared_error > uint64_t{allowed_} * count) return fit;
+  }
+  const Distances d = distances(fit, first, last, 0, nullptr);
+  fit.squared_error = d.sum;
   fit.most_squared = d.most;
   fit.feasible = d.most <= allowed_;
   return fit;
@@ -141,9 +167,9 @@ Fit Fitter::fit_line(uint32_t first, uint32_t last, int bits) const {
   // No line does better than this one; what is decoded is off the line by less than rounding may move it.
   constexpr double rounding = 0.87;
   const double reach = std::sqrt(static_cast<double>(allowed_)) + rounding;
-  if (line.residual > reach * reach) return best;
-  const BlockKernels& kernels = block_kernels(true);
-  const Extent extent = kernels.extent(run, line.axis);
+  const bool rgb = colors_.space() == ErrorSpace::rgb;
+  if (rgb && line.residual > reach * reach) return best;
+  const Extent extent = block_kernels(true).extent(run, line.axis);
   const auto center = static_cast<float>(line.mean[0] * line.axis[0] + line.mean[1] * line.axis[1] +
                                          line.mean[2] * line.axis[2]);
   const float lo = extent.least - center, hi = extent.most - center;
@@ -169,19 +195,21 @@ Fit Fitter::fit_line(uint32_t first, uint32_t last, int bits) const {
   for (size_t i = 0; i < static_cast<size_t>(tries_) && !best.feasible; ++i) {
     best.a = end(lo + insets[i][0] * half_cell);
     best.b = end(hi - insets[i][1] * half_cell);
-    const Distances d = kernels.distances(run, floats(best.a), floats(best.b), most, allowed_, nullptr);
+    const Distances d = distances(best, first, last, bits, nullptr);
     best.most_squared = d.most;
     best.squared_error = d.sum;
     best.feasible = d.most <= allowed_;
+    // Other ends are near these: where one colour is far off they do not help.
+    constexpr uint32_t hopeless = 6;
+    if (!rgb && d.most / hopeless > allowed_) break;
   }
   return best;
 }
 
 void Fitter::weights(const Fit& fit, uint32_t first, uint32_t last, int bits, uint8_t* out) const {
-  const ColorRun run = run_of(colors_, first, last);
-  std::vector<uint8_t> room(run.size + vector_size);
-  block_kernels(true).distances(run, floats(fit.a), floats(fit.b), (1 << bits) - 1, allowed_, room.data());
-  std::copy_n(room.begin(), run.size, out);
+  std::vector<uint8_t> room(last - first + vector_size);
+  distances(fit, first, last, bits, room.data());
+  std::copy_n(room.begin(), last - first, out);
 }
 
 }  // namespace voxkit::color

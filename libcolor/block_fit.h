@@ -7,6 +7,7 @@
 #include <span>
 #include <vector>
 
+#include "libcolor/block_kernel.h"
 #include "libcolor/block_layout.h"
 
 namespace voxkit::color {
@@ -14,8 +15,8 @@ namespace voxkit::color {
 /// The colours of a macro block as the encoder works on them.
 class MacroColors {
  public:
-  /// 1 to 16384 colours.
-  explicit MacroColors(std::span<const Rgb> colors);
+  /// 1 to 16384 colours, whose distances will be measured in `space`.
+  explicit MacroColors(std::span<const Rgb> colors, ErrorSpace space = ErrorSpace::rgb);
   uint32_t size() const { return size_; }
   Rgb color(uint32_t i) const;
 
@@ -24,10 +25,14 @@ class MacroColors {
   Sums sums(uint32_t first, uint32_t last) const;
   /// Channel c of all colours, as whole numbers; whole vectors may be read from any of them.
   const float* channel(size_t c) const { return channels_[c].data(); }
+  /// The same in CIELAB, times lab_scale, if the space is that.
+  const float* lab_channel(size_t c) const { return lab_[c].data(); }
+  ErrorSpace space() const { return space_; }
 
  private:
   uint32_t size_;
-  std::array<std::vector<float>, 3> channels_;
+  ErrorSpace space_;
+  std::array<std::vector<float>, 3> channels_, lab_;
   std::vector<Sums> prefix_;
 };
 
@@ -35,14 +40,14 @@ class MacroColors {
 struct Fit {
   bool feasible = false;       ///< no decoded colour is further than allowed
   Rgb a, b;                    ///< both ends, as decoded
-  uint32_t most_squared = 0;   ///< greatest squared distance
+  uint32_t most_squared = 0;   ///< greatest squared distance; in CIELAB times lab_scale^2
   uint64_t squared_error = 0;  ///< sum of squared distances
 };
 
 /// Fits runs of colours.
 class Fitter {
  public:
-  /// `allowed`: the greatest squared RGB distance that any decoded colour may have.
+  /// `allowed`: the greatest squared distance that any decoded colour may have, in the unit of a Fit.
   /// `effort`, 1 to 9: how many pairs of ends are tried.
   Fitter(const MacroColors& colors, Endpoints endpoints, uint32_t allowed, int effort)
       : colors_(colors), endpoints_(endpoints), allowed_(allowed), tries_(effort + 1) {}
@@ -54,6 +59,8 @@ class Fitter {
  private:
   Fit fit_single(uint32_t first, uint32_t last) const;
   Fit fit_line(uint32_t first, uint32_t last, int bits) const;
+  /// How far decoded colours are from what they were; `weights`: if not null, those that they get.
+  Distances distances(const Fit& fit, uint32_t first, uint32_t last, int bits, uint8_t* weights) const;
   Rgb quantised(const std::array<float, 3>& color) const;
 
   const MacroColors& colors_;

@@ -24,9 +24,9 @@ namespace avx2 {
 #endif
 
 const BlockKernels& block_kernels(bool native) {
-  static const BlockKernels any{portable::extent_of, portable::distances_of};
+  static const BlockKernels any{portable::extent_of, portable::distances_of, portable::nearest_of};
 #ifdef VOXKIT_AVX2
-  static const BlockKernels own{avx2::extent_of, avx2::distances_of};
+  static const BlockKernels own{avx2::extent_of, avx2::distances_of, avx2::nearest_of};
   if (native && has_avx2()) return own;
 #endif
   (void)native;

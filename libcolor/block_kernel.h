@@ -27,6 +27,10 @@ struct BlockKernels {
   /// not null, the steps, with room for whole vectors.
   Distances (*distances)(const ColorRun& run, const std::array<float, 3>& a, const std::array<float, 3>& b,
                          int most_weight, uint32_t allowed, uint8_t* weights);
+  /// The same for colours given as points, each of which becomes the nearest of `count` others, 1 to 16, of
+  /// equally near ones the first; squared distances are rounded up.
+  Distances (*nearest)(const ColorRun& run, const std::array<float, 3>* steps, int count, uint32_t allowed,
+                       uint8_t* weights);
 };
 
 /// native: those for this machine, else the portable ones.

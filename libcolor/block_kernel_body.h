@@ -94,3 +94,39 @@ VOXKIT_CODE static Distances distances_of(const ColorRun& run, const std::array<
   }
   return found;
 }
+
+VOXKIT_CODE static Distances nearest_of(const ColorRun& run, const std::array<float, 3>* steps, int count,
+                                        uint32_t allowed, uint8_t* weights) {
+  Distances found{0, 0};
+  // Before going on, whether that is worth it.
+  constexpr uint32_t batch = 8 * lanes;
+  for (uint32_t first = 0; first < run.size; first += batch) {
+    Floats far = fill(0), sum = fill(0);
+    const uint32_t last = run.size - first < batch ? run.size : first + batch;
+    for (uint32_t i = first; i < last; i += lanes) {
+      const Floats x = load(run.channels[0] + i), y = load(run.channels[1] + i), z = load(run.channels[2] + i);
+      Floats best = fill(3e38f), w = fill(0);
+      for (int k = 0; k < count; ++k) {
+        const Floats dx = x - fill(steps[k][0]), dy = y - fill(steps[k][1]), dz = z - fill(steps[k][2]);
+        const Floats d = dx * dx + dy * dy + dz * dz;
+        w = d < best ? fill(static_cast<float>(k)) : w;
+        best = least(d, best);
+      }
+      const Floats d = inside(i, last) ? best : fill(0);
+      far = greatest(far, d);
+      sum = sum + d;
+      if (weights != nullptr)
+        for (uint32_t k = 0; k < lanes; ++k) weights[i + k] = static_cast<uint8_t>(w[k]);
+    }
+    float furthest = 0;
+    for (uint32_t k = 0; k < lanes; ++k) {
+      furthest = far[k] > furthest ? far[k] : furthest;
+      found.sum += static_cast<uint64_t>(sum[k]);
+    }
+    auto whole = static_cast<uint32_t>(furthest);
+    if (static_cast<float>(whole) < furthest) ++whole;
+    if (whole > found.most) found.most = whole;
+    if (whole > allowed) break;
+  }
+  return found;
+}

@@ -32,6 +32,12 @@ enum class Endpoints : uint8_t {
   rgb888 = 2,  ///< 24 bits each
 };
 
+/// Where distances are measured. Numbers are part of FORMAT.md.
+enum class ErrorSpace : uint8_t {
+  rgb = 0,  ///< sRGB of 0 to 255
+  lab = 1,  ///< CIELAB
+};
+
 inline constexpr uint32_t macro_block_colors = 1 << 14;
 inline constexpr int part_log2 = 20;
 inline constexpr uint32_t part_colors = 1 << part_log2;

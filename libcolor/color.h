@@ -54,12 +54,13 @@ inline constexpr uint32_t most_palette_colors = 1 << 16;
 /// What an encoder is asked for.
 struct Options {
   ColorCodec codec = ColorCodec::vws;
-  double threshold = 9.56;  ///< of fws and vws: greatest distance of a decoded colour, in RGB of 0 to 255
-  int weight_bits = 3;      ///< of fws: 1 to 4
-  int effort = 3;           ///< of fws and vws: 1: the paper's greedy merging; up to 9: smaller, slower; of
-                            ///< textures: up to 9: nearer, slower; of palette: both
-  uint32_t palette = 256;   ///< of palette: colours of the scene's, at most; 1 to 2^16
-  int image_palette = 0;    ///< of png: colours of each image, 2 to 256; 0: all
+  double threshold = 9.56;             ///< of fws and vws: greatest distance of a decoded colour
+  ErrorSpace space = ErrorSpace::rgb;  ///< where that is measured
+  int weight_bits = 3;                 ///< of fws: 1 to 4
+  int effort = 3;          ///< of fws and vws: 1: the paper's greedy merging; up to 9: smaller, slower; of
+                           ///< textures: up to 9: nearer, slower; of palette: both
+  uint32_t palette = 256;  ///< of palette: colours of the scene's, at most; 1 to 2^16
+  int image_palette = 0;   ///< of png: colours of each image, 2 to 256; 0: all
   ImageCurve image_curve = ImageCurve::morton;  ///< of textures and images
   int quality = 100;  ///< of astc: 100: blocks of 4 x 4; down to 0: of 12 x 12; of images: ImageCoding
   Colors colors = Colors::leaf;
@@ -86,6 +87,7 @@ struct Params {
   // For the reader's information.
   int weight_bits = 0;
   double threshold = 0;
+  ErrorSpace space = ErrorSpace::rgb;  ///< of the threshold
   double grmse = 0;          ///< root mean square of the errors of all channels of all colours, 0 to 255
   uint64_t dag_nodes = 0;    ///< leaf words not counted
   uint64_t dag_bytes = 0;    ///< of nodes and leaf words
@@ -96,7 +98,7 @@ struct Params {
 /// What encoding found out.
 struct Report {
   Params params;
-  double most_error = 0;  ///< greatest RGB distance of a decoded colour
+  double most_error = 0;  ///< greatest distance of a decoded colour, in RGB or where the threshold is
   double color_seconds = 0,
          build_seconds = 0;  ///< of colours; of everything else, reading the source included
 };

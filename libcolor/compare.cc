@@ -4,15 +4,26 @@
 #include <cmath>
 #include <cstdlib>
 
+#include "formats/lab.h"
 #include "libcolor/store.h"
 
 namespace voxkit::color {
+
+namespace {
+
+Lab lab_of(Rgb c) {
+  return lab_of_linear(srgb_to_linear(c.r / 255.0), srgb_to_linear(c.g / 255.0), srgb_to_linear(c.b / 255.0));
+}
+
+}  // namespace
 
 Result<SurfaceDiff> compare(SurfaceSource& source, const Volume& volume, Context& ctx) {
   VOX_TRY(const DagView* const view, volume.store().dag(volume.container(), volume.params()));
   ColorReader reader(volume.store(), volume.container(), volume.params());
   SurfaceDiff diff;
+  const bool lab = volume.params().space == ErrorSpace::lab;
   uint64_t squares = 0;
+  double furthest_lab = 0;
   int64_t furthest = 0, furthest_channel = 0;
   const uint64_t end = uint64_t{1} << 3 * volume.params().height;
   VOX_CHECK(source.read(ctx, [&](std::span<const SurfaceVoxel> run) -> Status {
@@ -34,6 +45,8 @@ Result<SurfaceDiff> compare(SurfaceSource& source, const Volume& volume, Context
       }
       squares += static_cast<uint64_t>(distance);
       furthest = std::max(furthest, distance);
+      if (lab && distance > 0)
+        furthest_lab = std::max(furthest_lab, delta_e(lab_of(color), lab_of(voxel.color)));
     }
     return volume.store().status();
   }));
@@ -44,7 +57,7 @@ Result<SurfaceDiff> compare(SurfaceSource& source, const Volume& volume, Context
   diff.rmse = std::sqrt(mse);
   diff.psnr_db = 10 * std::log10(255.0 * 255.0 / mse);
   diff.max_abs_error = static_cast<double>(furthest_channel);
-  diff.max_distance = std::sqrt(static_cast<double>(furthest));
+  diff.max_distance = lab ? furthest_lab : std::sqrt(static_cast<double>(furthest));
   return diff;
 }
 

@@ -11,7 +11,7 @@ struct SurfaceDiff {
   double rmse = 0;           ///< root mean square of the errors of all channels, 0 to 255
   double psnr_db = 0;        ///< of peak 255
   double max_abs_error = 0;  ///< of a channel
-  double max_distance = 0;   ///< greatest RGB distance
+  double max_distance = 0;   ///< greatest distance, in RGB or where the threshold is
 };
 
 /// Reads `source` and looks every voxel up in `volume`, which has the same extents.

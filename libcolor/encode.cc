@@ -12,6 +12,7 @@
 #include "libcolor/dag_builder.h"
 #include "libcolor/dag_recount.h"
 #include "libcolor/image_codec.h"
+#include "libcolor/lab_colors.h"
 #include "libcolor/layout.h"
 #include "libcolor/palette_encode.h"
 #include "libcolor/texture.h"
@@ -98,7 +99,7 @@ class ColorWriter {
     if (options_.codec != ColorCodec::raw)
       return encode_part(colors,
                          {options_.threshold, options_.codec == ColorCodec::fws ? options_.weight_bits : 0,
-                          options_.effort});
+                          options_.effort, options_.space});
     EncodedPart part;
     static_assert(sizeof(Rgb) == 3);
     const auto raw = std::as_bytes(colors);
@@ -231,14 +232,16 @@ Result<Report> encode(SurfaceSource& source, const Options& options, const Store
   p.image_curve = options.image_curve;
   p.block_size = block_size_of(options);
   if (has_threshold(options.codec)) {
-    p.endpoints = endpoints_for(options.threshold);
+    p.endpoints = endpoints_for(options.threshold, options.space);
     p.threshold = options.threshold;
+    p.space = options.space;
     p.weight_bits = options.codec == ColorCodec::fws ? options.weight_bits : 0;
   }
   if (dag.color_count > 0)
     p.grmse =
         std::sqrt(static_cast<double>(colors.squared_error) / (3 * static_cast<double>(dag.color_count)));
   report.most_error = std::sqrt(static_cast<double>(colors.most_squared));
+  if (p.space == ErrorSpace::lab) report.most_error /= lab_scale;
   VOX_CHECK(container.add(params_kind, 0, 0, pack_params(p)));
   VOX_CHECK(container.finish());
   report.color_seconds = colors.seconds;

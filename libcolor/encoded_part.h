@@ -14,7 +14,8 @@ struct EncodedPart {
   std::vector<std::byte> bytes;
   uint64_t blocks = 0;
   uint64_t squared_error = 0;  ///< sum of squared RGB distances of decoded colours
-  uint32_t most_squared = 0;   ///< the greatest
+  uint32_t most_squared =
+      0;  ///< the greatest; of blocks with a threshold in CIELAB that there, times lab_scale^2
 
   /// Counts what a colour has become.
   void add_error(Rgb color, Rgb decoded) {

@@ -35,6 +35,7 @@ std::vector<std::byte> pack_params(const Params& p) {
     bytes[88] = static_cast<std::byte>(p.block_size.width);
     bytes[89] = static_cast<std::byte>(p.block_size.height);
   }
+  bytes[90] = static_cast<std::byte>(p.space);
   store_le(&bytes[8], p.leaf_voxels);
   store_le(&bytes[16], p.color_count);
   store_le(&bytes[24], p.root);
@@ -88,6 +89,7 @@ Result<Params> unpack_params(std::span<const std::byte> bytes, const VolumeInfo&
       return bad(
           88, fmt::format("blocks of {} x {}: not a size of ASTC", p.block_size.width, p.block_size.height));
   }
+  p.space = field(90) == 1 ? ErrorSpace::lab : ErrorSpace::rgb;
   p.height = field(4);
   p.weight_bits = field(5);
   p.leaf_voxels = number(8);

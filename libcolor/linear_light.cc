@@ -2,24 +2,22 @@
 
 #include <cmath>
 
+#include "formats/lab.h"
+
 namespace voxkit::color {
 namespace {
-
-double linear_of(double stored) {
-  return stored <= 0.04045 ? stored / 12.92 : std::pow((stored + 0.055) / 1.055, 2.4);
-}
 
 LightTables make_tables() {
   LightTables tables;
   for (size_t i = 0; i < 256; ++i)
     tables.linear[i] =
-        static_cast<uint16_t>(std::lrint(linear_of(static_cast<double>(i) / 255) * full_light));
+        static_cast<uint16_t>(std::lrint(srgb_to_linear(static_cast<double>(i) / 255) * full_light));
   // A stored value is rounded up where it is past the middle between two.
   tables.stored.resize(full_light + 1);
   size_t stored = 0;
   for (size_t i = 0; i < tables.stored.size(); ++i) {
     while (stored < 255 &&
-           linear_of((static_cast<double>(stored) + 0.5) / 255) * full_light <= static_cast<double>(i))
+           srgb_to_linear((static_cast<double>(stored) + 0.5) / 255) * full_light <= static_cast<double>(i))
       ++stored;
     tables.stored[i] = static_cast<uint8_t>(stored);
   }

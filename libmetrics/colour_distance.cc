@@ -8,31 +8,6 @@
 #include "libmetrics/image_diff.h"
 
 namespace voxkit {
-namespace {
-
-double lab_curve(double t) {
-  constexpr double knee = 6.0 / 29;
-  return t > knee * knee * knee ? std::cbrt(t) : t / (3 * knee * knee) + 4.0 / 29;
-}
-
-}  // namespace
-
-double srgb_to_linear(double stored) {
-  return stored <= 0.04045 ? stored / 12.92 : std::pow((stored + 0.055) / 1.055, 2.4);
-}
-
-Lab lab_of_linear(double r, double g, double b) {
-  // The white is the sum of each row, so that greys have a = b = 0 but for rounding.
-  const double x = lab_curve((0.4124 * r + 0.3576 * g + 0.1805 * b) / 0.9505);
-  const double y = lab_curve(0.2126 * r + 0.7152 * g + 0.0722 * b);
-  const double z = lab_curve((0.0193 * r + 0.1192 * g + 0.9505 * b) / 1.0890);
-  return {116 * y - 16, 500 * (x - y), 200 * (y - z)};
-}
-
-double delta_e(const Lab& p, const Lab& q) {
-  const double l = p.l - q.l, a = p.a - q.a, b = p.b - q.b;
-  return std::sqrt(l * l + a * a + b * b);
-}
 
 Result<LabDiff> diff_lab(const Image& a, const Image& b, Context& ctx) {
   VOX_CHECK(check_comparable(a, b));

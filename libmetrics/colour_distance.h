@@ -2,20 +2,9 @@
 #pragma once
 
 #include "formats/image.h"
+#include "formats/lab.h"
 
 namespace voxkit {
-
-/// CIE 1976 L*a*b* relative to the white D65; white has L = 100.
-struct Lab {
-  double l = 0, a = 0, b = 0;
-};
-
-/// The sRGB transfer function (IEC 61966-2-1) from a stored value, 0..1, to linear light.
-double srgb_to_linear(double stored);
-/// Linear light with the primaries of sRGB, 0..1 a channel.
-Lab lab_of_linear(double r, double g, double b);
-/// The CIE 1976 difference: Euclidean distance in L*a*b*. About 2.3 is just noticeable.
-double delta_e(const Lab& p, const Lab& q);
 
 struct LabDiff {
   double mean_delta_e = 0, max_delta_e = 0;  ///< over the pixels

@@ -17,7 +17,7 @@ struct Options {
   std::string input, output, tiles;
   SurfaceOptions surface;
   std::string kind = "thin", codec = "vws", image_curve = "morton", curve = "morton", colors = "leaf",
-              counts = "node";
+              counts = "node", space = "srgb";
   color::Options encoder;
   std::optional<uint32_t> palette;
   bool verify = false;
@@ -39,9 +39,11 @@ void declare(CommandLine& line, Options& o) {
               "astc: images, as textures, of 4, 8 and 0.89 to 8 bits a colour; palette: indices into a "
               "palette of the scene; jpeg, jp2, png: images as files, smaller, but decoded as a whole (vws)",
               one_of(o.codec, {"raw", "fws", "vws", "bc1", "bc7", "astc", "palette", "jpeg", "jp2", "png"}));
-  line.option("-e,--threshold", "E",
-              "Of blocks: no colour is further from the original, in RGB of 0 to 255 (9.56)",
+  line.option("-e,--threshold", "E", "Of blocks: no colour is further from the original (9.56)",
               number(o.encoder.threshold, 0, 1e6));
+  line.option("--space", "SPACE",
+              "Of blocks: the threshold is a distance in srgb, of 0 to 255, or in lab: CIELAB, 1976 (srgb)",
+              one_of(o.space, {"srgb", "lab"}));
   line.option("--weight-bits", "B", "Of fws: bits of a weight, 1 to 4 (3)",
               integer(o.encoder.weight_bits, 1, color::most_weight_bits));
   line.option(
@@ -91,6 +93,7 @@ color::Options encoder_options(const Options& o) {
     options.image_palette = static_cast<int>(*o.palette);
   options.image_curve = o.image_curve == "hilbert" ? color::ImageCurve::hilbert : color::ImageCurve::morton;
   options.curve = o.curve == "hilbert" ? color::Curve::hilbert : color::Curve::morton;
+  options.space = o.space == "lab" ? color::ErrorSpace::lab : color::ErrorSpace::rgb;
   options.colors = o.colors == "all" ? color::Colors::all : color::Colors::leaf;
   options.counts = o.counts == "pointer" ? color::Counts::pointer : color::Counts::node;
   return options;

@@ -60,7 +60,10 @@ std::string encoded(const std::string& key, int threads) {
   const std::map<std::string, ColorCodec> codecs{{"raw", ColorCodec::raw}, {"fws", ColorCodec::fws},
                                                  {"vws", ColorCodec::vws}, {"bc1", ColorCodec::bc1},
                                                  {"bc7", ColorCodec::bc7}, {"palette", ColorCodec::palette}};
-  options.codec = codecs.at(fields[1]);
+  // "vws-lab": with a threshold in CIELAB.
+  const auto codec = split(fields[1], '-');
+  options.codec = codecs.at(codec[0]);
+  if (codec.size() > 1) options.space = ErrorSpace::lab;
   options.threshold = std::stod(fields[2]);
   options.effort = std::stoi(fields[3]);
   options.palette = 100;  // fewer than the scenes have

@@ -87,7 +87,8 @@ class Tools(ToolCase):
         for options in (("--codec", "raw"), ("--codec", "fws"), ("--codec", "vws"), ("--codec", "bc1"),
                         ("--codec", "palette"), ("--codec", "palette", "--palette", "3", "--colors", "all"),
                         ("--codec", "bc1", "--image-curve", "hilbert", "--colors", "all"),
-                        ("--codec", "png"), ("--codec", "png", "--palette", "5", "--image-curve", "hilbert"), ("--codec", "png", "--palette", "200"), ("-e", "2"), ("-e", "25.5", "--effort", "1"),
+                        ("--codec", "png"), ("--codec", "png", "--palette", "5", "--image-curve", "hilbert"), ("--codec", "png", "--palette", "200"), ("-e", "2"),
+                        ("-e", "4", "--space", "lab"), ("-e", "25.5", "--effort", "1"),
                         ("--colors", "all"), ("--counts", "pointer"), ("--colors", "all", "--counts", "pointer"),
                         ("--curve", "hilbert"), ("--curve", "hilbert", "--counts", "pointer", "--colors", "all")):
             with self.subTest(options=options):

@@ -35,6 +35,7 @@ Json params_json(const color::Params& p) {
   json.set("codec", name(p.codec));
   if (color::has_threshold(p.codec)) {
     json.set("threshold", p.threshold);
+    json.set("space", p.space == color::ErrorSpace::lab ? "lab" : "srgb");
     json.set("endpoints", p.endpoints == color::Endpoints::rgb565 ? "565" : "888");
   }
   if (p.codec == color::ColorCodec::fws) json.set("weight_bits", p.weight_bits);
@@ -80,8 +81,8 @@ std::string sizes_text(const color::Params& p) {
     text += fmt::format("images      {}, along a {} curve\n",
                         (p.color_count + color::part_colors - 1) / color::part_colors, name(p.image_curve));
   if (color::has_threshold(p.codec))
-    text += fmt::format("blocks      {} in {} macro blocks, threshold {:.6g}\n", p.blocks, p.macro_blocks,
-                        p.threshold);
+    text += fmt::format("blocks      {} in {} macro blocks, threshold {:.6g}{}\n", p.blocks, p.macro_blocks,
+                        p.threshold, p.space == color::ErrorSpace::lab ? " in CIELAB" : "");
   return text;
 }
 
