@@ -25,6 +25,7 @@ class Step:
     needs: list      # steps whose output is read
     output: str      # file of the work folder, or "", or a pattern of pictures
     threads: int     # 0: as many as there are
+    repeat: int = 1  # times to run it; the fastest counts
     name: str = ""   # of the record, without ending
     label: str = ""  # for people
 
@@ -122,14 +123,15 @@ class Planner:
         for word in words:  # files that options name, too
             if word and word not in self.identities and WORK not in word:
                 self.identities[word] = identity(word, self.spec.folder)
-        content = [self.versions[tool], kind, tool, words, output, [need.name for need in needs],
+        repeat = self.spec.repeat if kind in ("encode", "decode", "render") else 1
+        content = [self.versions[tool], repeat, kind, tool, words, output, [need.name for need in needs],
                    [self.identities[word] for word in words if self.identities.get(word)]]
         digest = hashlib.sha256(json.dumps(content).encode()).hexdigest()[:16]
         name = f"{slug(title)}-{kind}-{digest}"
         if name not in self.made:
             full = [word.replace(WORK + WORK, WORK + name + output) for word in words]
             self.made[name] = Step(kind, tool, full, list(needs), name + output if output else "",
-                                   threads or self.spec.threads, name, f"{kind} {title}")
+                                   threads or self.spec.threads, repeat, name, f"{kind} {title}")
         return self.made[name]
 
     def case(self, entry, codec, options):

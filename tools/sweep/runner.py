@@ -92,11 +92,21 @@ def die_with_parent():
     LIBC.prctl(PR_SET_PDEATHSIG, signal.SIGKILL)
 
 
+def faster(before, record):
+    """The one of two records of a step whose program took less time, by its own clock; the first may be None."""
+    def seconds(one):
+        found = [one["result"].get(key) for key in ("encode_seconds", "decode_seconds", "ms_avg")]
+        return next((value for value in found if isinstance(value, (int, float))), one["seconds"])
+
+    return record if before is None or seconds(record) < seconds(before) else before
+
+
 class Process:
     """One step, running."""
 
     def __init__(self, step, command, threads, work, folder):
-        self.step, self.threads, self.start = step, threads, time.monotonic()
+        self.step, self.command, self.threads, self.start = step, command, threads, time.monotonic()
+        self.run, self.best = 1, None  # which of the step's runs this is, and the fastest before it
         base = os.path.join(work, f".{step.name}.{os.getpid()}")
         self.out, self.err = base + ".out", base + ".err"
         self.late = False
@@ -266,8 +276,18 @@ class Runner:
                     process.stop(signal.SIGKILL)
                 continue
             self.running.remove(process)
+            if record["status"] == "done":
+                record = faster(process.best, record)
+                if process.run < process.step.repeat:
+                    self.again(process, record)
+                    continue
             self.ran += 1
             self.end(process.step, record)
+
+    def again(self, process, best):
+        """Runs a step once more, where it ran before."""
+        self.running.append(Process(process.step, process.command, process.threads, self.records.work, self.spec.folder))
+        self.running[-1].run, self.running[-1].best = process.run + 1, best
 
     def end(self, step, record):
         if step.kind == "decode" and step.output:

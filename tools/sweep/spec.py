@@ -71,6 +71,7 @@ class Spec:
     metrics: tuple | None  # options of voxdiff; None: do not compare
     threads: int        # of each program; 0: all
     timeout: float      # seconds a program may take; 0: for ever
+    repeat: int         # times that encoders, decoders and renders run; the fastest counts
     keep: bool          # compressed files, after they have served
 
 
@@ -130,7 +131,8 @@ def read(name, option_names):
     """The Spec in a file; "-" is standard input. `option_names` says which options a program has."""
     value = load(name)
     place = Place("standard input" if name == "-" else name, "", value)
-    top = place.members(["inputs", "codecs", "renders", "metrics", "decode", "plots", "threads", "timeout", "keep", "title"],
+    top = place.members(["inputs", "codecs", "renders", "metrics", "decode", "plots", "threads", "timeout", "repeat",
+                         "keep", "title"],
                         ["inputs", "codecs"])
     inputs = named(place, top["inputs"], [read_input(item, option_names) for item in top["inputs"].items()])
     codecs = named(place, top["codecs"], [read_codec(item, inputs, option_names) for item in top["codecs"].items()])
@@ -147,6 +149,7 @@ def read(name, option_names):
         metrics=read_metrics(top["metrics"], option_names) if "metrics" in top else (),
         threads=top["threads"].number(0, 4096, whole=True) if "threads" in top else 0,
         timeout=top["timeout"].number(0, 10**9) if "timeout" in top else 0,
+        repeat=top["repeat"].number(1, 1000, whole=True) if "repeat" in top else 1,
         keep=top["keep"].boolean() if "keep" in top else False)
     settings = sum(len(codec.settings) * len(codec.inputs) for codec in codecs)
     if settings > MOST_SETTINGS:
