@@ -20,6 +20,7 @@ Lab lab_of(Rgb c) {
 Result<SurfaceDiff> compare(SurfaceSource& source, const Volume& volume, Context& ctx) {
   VOX_TRY(const DagView* const view, volume.store().dag(volume.container(), volume.params()));
   ColorReader reader(volume.store(), volume.container(), volume.params());
+  CellFinder finder(*view);
   SurfaceDiff diff;
   const bool lab = volume.params().space == ErrorSpace::lab;
   uint64_t squares = 0;
@@ -30,7 +31,7 @@ Result<SurfaceDiff> compare(SurfaceSource& source, const Volume& volume, Context
     VOX_CHECK(check_interrupt());
     diff.voxels += run.size();
     for (const SurfaceVoxel& voxel : run) {
-      const Found found = voxel.place < end ? find_voxel(*view, voxel.place) : Found{};
+      const Found found = voxel.place < end ? finder.find(voxel.place, 0) : Found{};
       if (!found.there) {
         diff.same_voxels = false;
         continue;

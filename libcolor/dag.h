@@ -43,6 +43,21 @@ enum class Counts : uint8_t {
 inline constexpr int leaf_height = 2;
 inline constexpr uint32_t wide_count = 0xffffff;
 
+/// By mask of octants: how many there are. Processors that are not asked for more than what all of them have
+/// would call a function for that.
+inline constexpr auto octant_counts = [] {
+  std::array<uint8_t, 256> counts{};
+  for (size_t mask = 0; mask < 256; ++mask) counts[mask] = static_cast<uint8_t>(std::popcount(mask));
+  return counts;
+}();
+VOX_HD_HOT uint32_t count_octants(uint32_t mask) {
+#ifdef __CUDA_ARCH__
+  return static_cast<uint32_t>(__popc(mask));
+#else
+  return octant_counts[mask];
+#endif
+}
+
 /// Octants of a leaf word that hold voxels, as a mask.
 VOX_HD constexpr uint32_t leaf_octants(uint64_t leaf) {
   uint32_t mask = 0;
@@ -50,10 +65,10 @@ VOX_HD constexpr uint32_t leaf_octants(uint64_t leaf) {
   return mask;
 }
 /// How many colours a leaf word has.
-VOX_HD constexpr uint32_t leaf_colors(uint64_t leaf, Colors colors) {
+VOX_HD inline uint32_t leaf_colors(uint64_t leaf, Colors colors) {
   const auto voxels = static_cast<uint32_t>(std::popcount(leaf));
   if (colors == Colors::leaf) return voxels;
-  return voxels + 1 + static_cast<uint32_t>(std::popcount(leaf_octants(leaf)));
+  return voxels + 1 + count_octants(leaf_octants(leaf));
 }
 /// The number, among the colours of a leaf word that is gone through in a state, of that of voxel `bit`,
 /// which is there.
@@ -62,7 +77,7 @@ inline uint32_t leaf_index(uint64_t leaf, uint32_t bit, Colors colors, OrderStat
   if (colors == Colors::leaf) return before;
   const uint32_t octant = bit >> 3;
   const uint32_t octants = leaf_octants(leaf) & (octant_orders.before[state][octant] | 1u << octant);
-  return before + 1 + static_cast<uint32_t>(std::popcount(octants));
+  return before + 1 + count_octants(octants);
 }
 
 /// Words of a node with `octants` children.

@@ -2,6 +2,7 @@
 // pointer that leads outside is never followed.
 #pragma once
 
+#include <algorithm>
 #include <array>
 #include <bit>
 #include <cstdint>
@@ -19,9 +20,7 @@ struct NodeRef {
 
   VOX_HD bool has(uint32_t octant) const { return mask >> octant & 1; }
   /// Which of the children an octant is.
-  VOX_HD uint32_t number(uint32_t octant) const {
-    return static_cast<uint32_t>(std::popcount(mask & ((1u << octant) - 1)));
-  }
+  VOX_HD uint32_t number(uint32_t octant) const { return count_octants(mask & ((1u << octant) - 1)); }
 };
 
 /// A child on the way down.
@@ -50,8 +49,7 @@ struct DagView {
     if (pointer >= words[at]) return {};
     const uint32_t* const first = nodes[at] + pointer;
     const uint32_t mask = *first & 0xff;
-    const uint32_t length =
-        node_words(static_cast<uint32_t>(std::popcount(mask)), *first >> 8 == wide_count, counts);
+    const uint32_t length = node_words(count_octants(mask), *first >> 8 == wide_count, counts);
     if (length > words[at] - pointer) return {};
     return {first, mask};
   }
@@ -66,7 +64,7 @@ struct DagView {
     if (count != wide_count) return count;
     const NodeRef ref = node(h, pointer);
     if (ref.words == nullptr) return 0;
-    const uint32_t* const wide = first + 1 + std::popcount(ref.mask);
+    const uint32_t* const wide = first + 1 + count_octants(ref.mask);
     return wide[0] | static_cast<uint64_t>(wide[1]) << 32;
   }
 
@@ -112,7 +110,7 @@ inline uint32_t leaf_cell_index(uint64_t leaf, uint32_t bit, int height, OrderSt
   const uint32_t octant = bit >> 3;
   const uint32_t first = 8 * octant + octant_orders.octant[octant_orders.next[state][octant]][0];
   const uint64_t before = leaf & octant_orders.voxels_before[state][first];
-  return 1 + static_cast<uint32_t>(std::popcount(before) + std::popcount(leaf_octants(before)));
+  return 1 + static_cast<uint32_t>(std::popcount(before)) + count_octants(leaf_octants(before));
 }
 
 /// Whether there is a voxel in the cell of some height, 0 for the voxel itself, around a place, a Morton code
@@ -121,29 +119,56 @@ struct Found {
   bool there = false;
   uint64_t color = 0;
 };
-inline Found find_cell(const DagView& view, uint64_t place, int height) {
-  OrderState state = first_state(view.curve);
-  uint32_t pointer = view.root;
-  uint64_t color = 0;
-  for (int h = view.height; h > leaf_height; --h) {
-    const auto octant = static_cast<uint32_t>(place >> 3 * (h - 1) & 7);
-    const NodeRef node = view.node(h, pointer);
-    if (node.words == nullptr) return {};
-    if (h == height) return {true, color};
-    if (!node.has(octant)) return {};
-    const ChildRef child = view.child(node, h, octant, state);
-    pointer = child.pointer;
-    color += child.colors_before;
-    state = octant_orders.next[state][octant];
+
+/// Finds cells one after the other: keeps the way to the last one, most of which is that to its neighbours.
+class CellFinder {
+ public:
+  explicit CellFinder(const DagView& view) : view_(view), lowest_(view.height) {
+    path_[static_cast<size_t>(view.height)] = {view.root, first_state(view.curve), 0};
   }
-  const auto bit = static_cast<uint32_t>(place & 63);
-  const uint64_t leaf = view.leaf(pointer);
-  const int shift = 3 * height, width = 1 << shift;
-  const uint64_t cell =
-      height >= leaf_height ? leaf : leaf >> (bit >> shift << shift) & ((uint64_t{1} << width) - 1);
-  if (cell == 0) return {};
-  return {true, color + (height == 0 ? leaf_index(leaf, bit, view.colors, state)
-                                     : leaf_cell_index(leaf, bit, height, state))};
+
+  Found find(uint64_t place, int height) {
+    // Nodes of this height and above are those of the last place.
+    const int common = (static_cast<int>(std::bit_width(place ^ place_)) + 2) / 3;
+    place_ = place;
+    for (int h = std::max({lowest_, common, height}); h > leaf_height; --h) {
+      lowest_ = h;
+      const Step at = path_[static_cast<size_t>(h)];
+      const auto octant = static_cast<uint32_t>(place >> 3 * (h - 1) & 7);
+      const NodeRef node = view_.node(h, at.pointer);
+      if (node.words == nullptr) return {};
+      if (h == height) return {true, at.color};
+      if (!node.has(octant)) return {};
+      const ChildRef child = view_.child(node, h, octant, at.state);
+      path_[static_cast<size_t>(h) - 1] = {child.pointer, octant_orders.next[at.state][octant],
+                                           at.color + child.colors_before};
+    }
+    lowest_ = leaf_height;
+    const Step at = path_[leaf_height];
+    const auto bit = static_cast<uint32_t>(place & 63);
+    const uint64_t leaf = view_.leaf(at.pointer);
+    const int shift = 3 * height, width = 1 << shift;
+    const uint64_t cell =
+        height >= leaf_height ? leaf : leaf >> (bit >> shift << shift) & ((uint64_t{1} << width) - 1);
+    if (cell == 0) return {};
+    return {true, at.color + (height == 0 ? leaf_index(leaf, bit, view_.colors, at.state)
+                                          : leaf_cell_index(leaf, bit, height, at.state))};
+  }
+
+ private:
+  struct Step {
+    uint32_t pointer;
+    OrderState state;
+    uint64_t color;  ///< the first one of the node
+  };
+  const DagView& view_;
+  std::array<Step, most_levels + 1> path_;  ///< by height, down to `lowest_`
+  uint64_t place_ = 0;
+  int lowest_;
+};
+
+inline Found find_cell(const DagView& view, uint64_t place, int height) {
+  return CellFinder(view).find(place, height);
 }
 inline Found find_voxel(const DagView& view, uint64_t place) {
   return find_cell(view, place, 0);

@@ -6,6 +6,7 @@
 
 #include "libcolor/morton.h"
 #include "libcolor/store.h"
+#include "libcolor/void_search.h"
 
 namespace voxkit::color {
 namespace {
@@ -145,47 +146,19 @@ Status Volume::decode(const Box& box, VoxelSpan out) const {
   return store_->status();
 }
 
-namespace {
-
-/// Whether there may be a voxel in a box. Every node has some, so those that lie inside as a whole need no
-/// look.
-class BoxSearch {
- public:
-  BoxSearch(const DagView& view, const Box& box) : view_(view), box_(box) {}
-  bool may_have_voxels(int h, uint32_t pointer, Index3 corner) {
-    const Box cell{corner, corner + (int64_t{1} << h)};
-    if (intersect(cell, box_).empty()) return false;
-    // Along the sides of a large box there may be many: then it is not known.
-    if (box_.contains(cell) || --budget_ < 0) return true;
-    if (h == leaf_height) {
-      for (uint64_t left = view_.leaf(pointer); left != 0; left &= left - 1)
-        if (box_.contains(corner + Index3(morton_place(static_cast<uint64_t>(std::countr_zero(left))))))
-          return true;
-      return false;
-    }
-    const NodeRef ref = view_.node(h, pointer);
-    if (ref.words == nullptr) return true;
-    for (uint32_t octant = 0; octant < 8; ++octant)
-      if (ref.has(octant) && may_have_voxels(h - 1, view_.pointer(ref, ref.number(octant)),
-                                             octant_corner(corner, octant, int64_t{1} << (h - 1))))
-        return true;
-    return false;
-  }
-
- private:
-  const DagView& view_;
-  Box box_;
-  int budget_ = 4096;
-};
-
-}  // namespace
-
 std::optional<Voxel> Volume::uniform(const Box& box) const {
   if (params_.leaf_voxels == 0) return Voxel{};
   const auto view = store_->dag(*container_, params_);
-  if (!view || BoxSearch(**view, box).may_have_voxels(params_.height, params_.root, Index3(0)))
-    return std::nullopt;
-  return Voxel{};
+  if (!view || box.empty()) return std::nullopt;
+  // Along the sides of a large box there may be many nodes: then it is not known.
+  VoidSearch is_void(**view, 4096);
+  const auto corner = [](Index3 at, uint32_t(&out)[3]) {
+    for (int a = 0; a < 3; ++a) out[a] = static_cast<uint32_t>(at[a]);
+  };
+  uint32_t lo[3], hi[3];
+  corner(box.lo, lo);
+  corner(box.hi, hi);
+  return is_void(lo, hi) ? std::optional(Voxel{}) : std::nullopt;
 }
 
 Status Volume::for_each_voxel(const SurfaceSource::Sink& sink, Context&) const {

@@ -73,12 +73,14 @@ struct DagCastView {
 /// A compressed surface, drawn from its file.
 class DagGrid {
  public:
-  explicit DagGrid(std::shared_ptr<const color::Volume> volume) : volume_(std::move(volume)) {}
+  explicit DagGrid(std::shared_ptr<const color::Volume> volume);
   const VolumeInfo& info() const { return volume_->info(); }
   const color::Volume& volume() const { return *volume_; }
+  const LearnedVoid& learned() const { return *learned_; }
 
  private:
   std::shared_ptr<const color::Volume> volume_;
+  std::shared_ptr<const LearnedVoid> learned_;
 };
 
 }  // namespace voxkit::render

@@ -99,7 +99,7 @@ class DenseGrid {
   std::unique_ptr<Buffer> buffer_;
 };
 
-class VoidMemo;
+class LearnedVoid;
 
 /// A compressed volume, drawn from its file.
 class SvmmGrid {
@@ -107,13 +107,11 @@ class SvmmGrid {
   explicit SvmmGrid(std::shared_ptr<const svmm::Volume> volume);
   const VolumeInfo& info() const { return volume_->info(); }
   const svmm::Volume& volume() const { return *volume_; }
-  /// What was learned of the volume's void from earlier pictures that showed the same range of values.
-  Result<std::shared_ptr<VoidMemo>> void_memo(const ValueRange& range, Context& ctx) const;
+  const LearnedVoid& learned() const { return *learned_; }
 
  private:
   std::shared_ptr<const svmm::Volume> volume_;
-  struct Learned;
-  std::shared_ptr<Learned> learned_;
+  std::shared_ptr<const LearnedVoid> learned_;
 };
 
 }  // namespace voxkit::render

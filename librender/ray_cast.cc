@@ -5,7 +5,6 @@
 #include <chrono>
 #include <cmath>
 #include <glm/geometric.hpp>
-#include <mutex>
 
 #include "formats/parallel.h"
 #include "libcolor/store.h"
@@ -27,10 +26,9 @@ struct Rect {
 };
 
 /// A block of pixels, of which (x, y) is the first, each given to `keep`.
-template <int width, int height, class Keep>
-[[gnu::always_inline]] inline void cast_packet(const CastParams& params, const Mirror& mirror,
-                                               BoxedSvmmView::Cursor& cursor, VoidTrail& trail, int x, int y,
-                                               const Keep& keep) {
+template <int width, int height, class Cursor, class Keep>
+[[gnu::always_inline]] inline void cast_packet(const CastParams& params, const Mirror& mirror, Cursor& cursor,
+                                               VoidTrail& trail, int x, int y, const Keep& keep) {
   RayPacket<width, height> rays(params, mirror, x, y);
   trail.follow(rays);
   for (int i = 0; i < width * height; ++i) {
@@ -69,6 +67,11 @@ template <int width, int height, class Keep>
   }
 }
 
+template <class View>
+constexpr bool has_boxes = false;
+template <class Space>
+constexpr bool has_boxes<BoxedView<Space>> = true;
+
 /// The pixels of a tile: a cursor goes on where the last ray ended. `details` may be null. Packets are 2 x
 /// `packet_height` pixels.
 template <int packet_height, class View>
@@ -104,7 +107,7 @@ template <int packet_height, class View>
   blank(tile.x0, left, top, bottom);
   blank(right, tile.x1, top, bottom);
   blank(tile.x0, tile.x1, bottom, tile.y1);
-  if constexpr (std::is_same_v<View, BoxedSvmmView>) {
+  if constexpr (has_boxes<View>) {
     for (int y = top; y < bottom; y += square)
       for (int x = left; x < right; x += square) {
         const int x_end = std::min(x + square, right), y_end = std::min(y + square, bottom);
@@ -196,23 +199,10 @@ int least_log2(const VolumeInfo& info, const Camera& camera, const CastOptions& 
 
 }  // namespace
 
-struct SvmmGrid::Learned {
-  std::mutex mutex;
-  std::shared_ptr<VoidMemo> void_memo;
-};
-
 SvmmGrid::SvmmGrid(std::shared_ptr<const svmm::Volume> volume)
-    : volume_(std::move(volume)), learned_(std::make_shared<Learned>()) {}
-
-Result<std::shared_ptr<VoidMemo>> SvmmGrid::void_memo(const ValueRange& range, Context& ctx) const {
-  const std::lock_guard lock(learned_->mutex);
-  std::shared_ptr<VoidMemo>& memo = learned_->void_memo;
-  if (!memo || !(memo->range() == range)) {
-    memo.reset();
-    VOX_TRY(memo, VoidMemo::create(range, ctx));
-  }
-  return memo;
-}
+    : volume_(std::move(volume)), learned_(std::make_shared<LearnedVoid>()) {}
+DagGrid::DagGrid(std::shared_ptr<const color::Volume> volume)
+    : volume_(std::move(volume)), learned_(std::make_shared<LearnedVoid>()) {}
 
 Status cast(const DenseGrid& grid, const Camera& camera, const CastOptions& options, Frame& frame,
             Context& ctx) {
@@ -237,8 +227,9 @@ Status cast(const SvmmGrid& grid, const Camera& camera, const CastOptions& optio
     const SvmmView<MappedPools, Search::path> path{view, &pools};
     VOX_CHECK(cast_with(path, params, options, frame, ctx));
   } else {
-    VOX_TRY(const std::shared_ptr<VoidMemo> memo, grid.void_memo(options.range, ctx));
-    const BoxedSvmmView boxed{view, &pools, &params, memo.get(), least_log2(info, camera, options)};
+    VOX_TRY(const std::shared_ptr<VoidMemo> memo, grid.learned().memo(options.range, ctx));
+    const BoxedView<SvmmSpace> boxed{
+        {view, &pools, {&params.colour_of}}, &params, memo.get(), least_log2(info, camera, options)};
     VOX_CHECK(cast_with(boxed, params, options, frame, ctx));
   }
   return grid.volume().store().status();
@@ -254,8 +245,12 @@ Status cast(const DagGrid& grid, const Camera& camera, const CastOptions& option
   detailed.details = true;  // where to look colours up
   if (options.traversal == Traversal::restart) {
     VOX_CHECK(cast_with(DagCastView<Search::restart>{dag}, params, detailed, frame, ctx));
-  } else {
+  } else if (params.cone > 0 || !options.skip) {
     VOX_CHECK(cast_with(DagCastView<Search::path>{dag}, params, detailed, frame, ctx));
+  } else {
+    VOX_TRY(const std::shared_ptr<VoidMemo> memo, grid.learned().memo({}, ctx));
+    const BoxedView<DagSpace> boxed{{{dag}}, &params, memo.get(), least_log2(grid.info(), camera, options)};
+    VOX_CHECK(cast_with(boxed, params, detailed, frame, ctx));
   }
   VOX_CHECK(look_up_colors(volume, frame, ctx));
   if (!options.details) frame.details.clear();

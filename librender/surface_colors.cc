@@ -15,6 +15,7 @@ Status look_up_colors(const color::Volume& volume, Frame& frame, Context& ctx) {
   constexpr int64_t rows = 16;  // row by row: neighbours are mostly in one block
   VOX_CHECK(parallel_for(ctx, (frame.height + rows - 1) / rows, [&](int64_t task) -> Status {
     color::ColorReader reader(volume.store(), volume.container(), volume.params());
+    color::CellFinder finder(*dag);
     const int64_t width = frame.width, first = task * rows * width,
                   last = std::min<int64_t>((task + 1) * rows, frame.height) * width;
     for (int64_t i = first; i < last; ++i) {
@@ -24,7 +25,7 @@ Status look_up_colors(const color::Volume& volume, Frame& frame, Context& ctx) {
           static_cast<uint32_t>(voxel[0]), static_cast<uint32_t>(voxel[1]), static_cast<uint32_t>(voxel[2]));
       float(&pixel)[4] = frame.pixels[static_cast<size_t>(i)].colour;
       const auto height = static_cast<int>(pixel[0] * 255 + 0.5f);  // of the cell, see DagCastView
-      const color::Rgb c = reader.color(color::find_cell(*dag, place, height).color);
+      const color::Rgb c = reader.color(finder.find(place, height).color);
       const Colour seen = ColourOf(VoxelFormat::rgba32, {})(
           Voxel::of(static_cast<uint32_t>(c.r | c.g << 8 | c.b << 16) | 0xff000000u));
       for (int k = 0; k < 3; ++k) pixel[k] = seen.rgb[k];

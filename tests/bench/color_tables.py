@@ -20,7 +20,6 @@ import sys
 
 THRESHOLDS = ["6.38", "9.56", "12.8", "25.5"]
 GREEDY = ("--effort", "1")
-JP2 = (95, 75, 50, 25)
 SETTINGS = (
     [("2", "bc1", "", ("--codec", "bc1")), ("2", "bc7", "", ("--codec", "bc7"))]
     + [("2", "astc", block, ("--codec", "astc", "--quality", quality))
@@ -29,13 +28,14 @@ SETTINGS = (
        for codec in ("fws", "vws") for more in ((), GREEDY) for e in THRESHOLDS]
     + [("4", "vws hilbert", f"e={e}", ("--codec", "vws", "-e", e, "--curve", "hilbert")) for e in THRESHOLDS]
     + [("4", "vws lab", f"e={e}", ("--codec", "vws", "-e", e, "--space", "lab")) for e in ("2.3", "5")]
-    + [("4", "palette", f"{n} colours", ("--codec", "palette", "--palette", n)) for n in (16384, 4096, 2048, 256)]
+    + [("4", "palette", f"{n} colours", ("--codec", "palette", "--palette", n)) for n in (65536, 16384, 4096, 2048, 256)]
     + [("6", codec, f"e={e}", ("--codec", codec, "-e", e, "--colors", "all")) for codec in ("fws", "vws") for e in ("6.38", "9.56")]
     + [("6", "palette", "2048 colours", ("--codec", "palette", "--palette", 2048, "--colors", "all"))]
     + [("8", "jpeg", str(q), ("--codec", "jpeg", "--quality", q)) for q in (95, 85, 75, 50)]
-    + [("8", "jp2", str(q), ("--codec", "jp2", "--quality", q)) for q in JP2]
+    + [("8", "jp2", str(q), ("--codec", "jp2", "--quality", q)) for q in (80, 60, 40, 20)]
     + [("8", "png", "lossless", ("--codec", "png"))]
-    + [("8", "png", f"{n} colours", ("--codec", "png", "--palette", n)) for n in (256, 64, 16)]
+    + [("8", "png", "256 colours", ("--codec", "png", "--palette", 256))]
+    + [("8", "png", f"quality {q}", ("--codec", "png", "--quality", q)) for q in (70, 30, 10)]
 )
 COLUMNS = ["scene", "table", "codec", "setting", "percent", "bits_per_voxel", "grmse", "rmse", "ms_ssim", "color_seconds"]
 TITLES = {"2": "Textures", "4": "Blocks and palettes", "6": "Colours of all nodes", "8": "Images"}

@@ -8,6 +8,7 @@
 #include <utility>
 
 #include "formats/copy.h"
+#include "libcolor/volume_surface.h"
 #include "librender/ray_cast.h"
 #include "tests/bench/nanovdb_cast.h"
 #include "tests/bench/opaque_source.h"
@@ -83,6 +84,28 @@ Result<Compressed> compress(const Options& o, double quality, Context& ctx) {
   return compressed;
 }
 
+struct CompressedSurface {
+  std::shared_ptr<const color::Volume> volume;
+  uint64_t bytes = 0;
+};
+
+/// As a DAG, with its colours in blocks.
+Result<CompressedSurface> compress_surface(const Options& o, Context& ctx) {
+  VOX_TRY(auto source, open_surface(o, ctx));
+  VOX_TRY(const auto surface, color::surface_of(std::move(source)));
+  const auto bytes = std::make_shared<std::vector<std::byte>>();
+  const ByteSink append = [&](std::span<const std::byte> more) -> Status {
+    bytes->insert(bytes->end(), more.begin(), more.end());
+    return {};
+  };
+  VOX_CHECK(color::encode(*surface, {}, append, ctx));
+  VOX_TRY(auto container, Container::open(*bytes, o.input, bytes));
+  CompressedSurface compressed;
+  VOX_TRY(compressed.volume, color::Volume::open(std::move(container)));
+  compressed.bytes = bytes->size();
+  return compressed;
+}
+
 using Voxels = std::vector<std::array<int32_t, 3>>;  // the first voxel of each ray; -1: none
 
 /// One way to find first hits, and what it cost so far.
@@ -100,11 +123,12 @@ struct Contender {
 };
 
 std::vector<Contender> contenders(const Compressed& lossless, const Compressed& lossy,
+                                  const CompressedSurface& surface,
                                   const std::shared_ptr<const NanovdbGrid>& peer, const Options& o,
                                   Context& ctx) {
   std::vector<Contender> all;
-  const auto add_ours = [&](std::string name, const Compressed& compressed) {
-    const auto cast_frame = [grid = SvmmGrid(compressed.volume), frame = std::make_shared<Frame>(), &o, &ctx](
+  const auto add_ours = [&](std::string name, const auto& our_grid, uint64_t bytes) {
+    const auto cast_frame = [grid = our_grid, frame = std::make_shared<Frame>(), &o, &ctx](
                                 const Camera& camera, Voxels& voxels) -> Result<double> {
       CastOptions options;
       options.width = o.width;
@@ -114,10 +138,11 @@ std::vector<Contender> contenders(const Compressed& lossless, const Compressed& 
       for (size_t i = 0; i < frame->details.size(); ++i) voxels[i] = std::to_array(frame->details[i].voxel);
       return frame->seconds;
     };
-    all.push_back({std::move(name), compressed.bytes, cast_frame, {}, 0, 0});
+    all.push_back({std::move(name), bytes, cast_frame, {}, 0, 0});
   };
-  add_ours("svmm, lossless", lossless);
-  add_ours("svmm, quality 80", lossy);
+  add_ours("svmm, lossless", SvmmGrid(lossless.volume), lossless.bytes);
+  add_ours("svmm, quality 80", SvmmGrid(lossy.volume), lossy.bytes);
+  add_ours("DAG, colours looked up", DagGrid(surface.volume), surface.bytes);
   const auto hits = std::make_shared<std::vector<Hit>>();
   const auto add_peer = [&](std::string name, CastFunction* cast_function, March march, bool doubles) {
     const auto cast_frame = [=, &o, &ctx](const Camera& camera, Voxels& voxels) -> Result<double> {
@@ -171,11 +196,12 @@ Result<int> work(const Options& o, cli::Run& run) {
   run.stage("compress");
   VOX_TRY(const Compressed lossless, compress(o, 100, run.ctx));
   VOX_TRY(const Compressed lossy, compress(o, 80, run.ctx));
+  VOX_TRY(const CompressedSurface surface, compress_surface(o, run.ctx));
   run.stage("NanoVDB");
   VOX_TRY(const auto source, open_surface(o, run.ctx));
   VOX_TRY(const auto peer, NanovdbGrid::build(*source, run.ctx));
   run.stage("cast");
-  auto all = contenders(lossless, lossy, peer, o, run.ctx);
+  auto all = contenders(lossless, lossy, surface, peer, o, run.ctx);
   VOX_CHECK(run_all(all, cameras, o, run.ctx));
 
   const double frame_rays = static_cast<double>(o.width) * static_cast<double>(o.height);

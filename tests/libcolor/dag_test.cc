@@ -143,20 +143,24 @@ TEST(Dag, VoxelsAndTheirColorsAreThoseOfTheTree) {
       EXPECT_EQ(dag->voxels, c.voxels.size());
       EXPECT_EQ(dag->color_count, order.count);
       const DagView view = view_of(*dag);
+      CellFinder finder(view);
       for (const auto& [place, index] : order.index) {
-        const Found found = find_voxel(view, place);
-        ASSERT_TRUE(found.there) << place;
+        const Found found = find_voxel(view, place), next = finder.find(place, 0);
+        ASSERT_TRUE(found.there && next.there) << place;
         ASSERT_EQ(found.color, index) << place;
+        ASSERT_EQ(next.color, index) << place;
       }
       for (const auto& [cell, index] : order.cell_index) {
-        const Found found = find_cell(view, cell.second << 3 * cell.first, cell.first);
-        ASSERT_TRUE(found.there);
+        const uint64_t place = cell.second << 3 * cell.first;
+        const Found found = find_cell(view, place, cell.first), next = finder.find(place, cell.first);
+        ASSERT_TRUE(found.there && next.there);
         ASSERT_EQ(found.color, index) << "height " << cell.first;
+        ASSERT_EQ(next.color, index) << "height " << cell.first;
       }
       // No other voxels: all places of small grids, neighbours in the large one.
       const uint64_t end = dag->voxels == 0 ? 64 : uint64_t{1} << 3 * std::min(c.height, 7);
       for (uint64_t place = 0; place < end; ++place)
-        ASSERT_EQ(find_voxel(view, place).there, order.index.count(place) == 1) << place;
+        ASSERT_EQ(finder.find(place, 0).there, order.index.count(place) == 1) << place;
       for (const SurfaceVoxel& v : c.voxels)
         if (c.height > 7) {
           ASSERT_EQ(find_voxel(view, v.place ^ 1).there, order.index.count(v.place ^ 1) == 1);
