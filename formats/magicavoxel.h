@@ -3,19 +3,16 @@
 
 #include <array>
 #include <cstdint>
+#include <memory>
+#include <span>
 #include <string>
 #include <vector>
 
 #include "formats/reservation.h"
 #include "formats/volume.h"
+#include "formats/voxel_sink.h"
 
 namespace voxkit {
-
-/// A voxel of a scene: its place, and its colour as R, G, B in sRGB.
-struct ModelVoxel {
-  std::array<int32_t, 3> place;
-  std::array<uint8_t, 3> color;
-};
 
 /// All voxels of a scene, models in the order in which they are placed: of several at one place the last one
 /// counts. The axes are turned so that y points up, as renderers have it: x, z and -y of the file.
@@ -28,5 +25,33 @@ struct VoxelScene {
 /// translations and rotations; what is hidden is left out. Places are within 2^20 of the origin. Errors:
 /// ErrorCode::input with the byte where a rule is broken, ErrorCode::limit.
 Result<VoxelScene> read_magicavoxel(const std::string& path, Context& ctx);
+
+/// A voxel and the number of its colour in a palette.
+struct IndexedVoxel {
+  std::array<int32_t, 3> place;
+  uint8_t color;
+};
+
+class MagicaVoxelWriter {
+ public:
+  virtual ~MagicaVoxelWriter() = default;
+  /// Takes voxels inside the volume, in any order, each place once.
+  virtual Status add(std::span<const IndexedVoxel> voxels) = 0;
+  /// Completes the file; without it, it never appears.
+  virtual Status finish() = 0;
+};
+
+/// Whether a file can hold so many voxels in such a volume: ErrorCode::limit for more than 2^20 a side, or
+/// for 2 GiB.
+Status check_magicavoxel(const std::string& path, const Index3& dims, uint64_t voxels);
+
+/// Writes a file of version 150: a model for each cube of 256 voxels a side that has any, in a scene that
+/// puts them where they are, turned so that `read_magicavoxel` gives the same places. `palette` has up to 255
+/// colours, R, G and B in sRGB; `voxels` will come. Memory: 8 bytes a voxel. Errors: those of
+/// check_magicavoxel and of OutputFile.
+Result<std::unique_ptr<MagicaVoxelWriter>> create_magicavoxel(const std::string& path, const Index3& dims,
+                                                              uint64_t voxels,
+                                                              std::span<const std::array<uint8_t, 3>> palette,
+                                                              bool force, Context& ctx);
 
 }  // namespace voxkit

@@ -18,7 +18,7 @@
 namespace voxkit {
 
 /// Grows with every change of ModuleTable or of a type that it mentions.
-inline constexpr uint32_t module_abi = 5;
+inline constexpr uint32_t module_abi = 6;
 
 struct ModuleTable {
   uint32_t abi = module_abi;
@@ -26,6 +26,9 @@ struct ModuleTable {
   SourceResult (*open)(const std::string& path, const std::string& grid, Context& ctx) = nullptr;
   /// Null in modules that only read.
   SinkResult (*create)(const std::string& path, const VolumeInfo& info, bool force, Context& ctx) = nullptr;
+  /// Voxels with colours, one by one (openvdb only): `create_vdb_voxels` of readers.h.
+  VoxelSinkResult (*create_voxels)(const std::string& path, const VolumeInfo& info, bool force,
+                                   Context& ctx) = nullptr;
   /// Single images (image_stack only): `read_image` and `write_image` of image.h.
   Result<std::optional<Image>> (*read_image)(const std::string& path, Context& ctx) = nullptr;
   Status (*write_image)(const std::string& path, const Image& image, bool force,

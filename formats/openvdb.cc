@@ -17,6 +17,7 @@
 
 #include "formats/mapped_file.h"
 #include "formats/module.h"
+#include "formats/openvdb_grids.h"
 #include "formats/openvdb_tree.h"
 
 namespace voxkit {
@@ -54,98 +55,6 @@ void register_types() {
     openvdb::BoolMetadata::registerType();  // whether values are stored as halves
   });
 }
-
-// ---------------------------------------------------------------------------------------------- the file's
-// structure
-
-/// A grid as the file announces it.
-struct GridEntry {
-  std::string name, type, parent;
-  int64_t descriptor = 0, start = 0, end = 0;  ///< byte offsets
-  bool is(const char* tree) const { return type == tree || type == std::string(tree) + "_HalfFloat"; }
-  bool is_float() const { return is("Tree_float_5_4_3"); }
-  bool is_vec3s() const { return is("Tree_vec3s_5_4_3"); }
-};
-
-/// OpenVDB trusts the lengths in a file. So they are walked through here first: a stream that throws at the
-/// end of the file, and no length taken that exceeds the bytes that follow.
-class Walker {
- public:
-  Walker(std::istream& stream, int64_t size) : stream_(stream), size_(size) {}
-
-  Result<std::vector<GridEntry>> grids(const std::string& path) {
-    stream_.seekg(0);
-    if (number<int64_t>() != openvdb::OPENVDB_MAGIC)
-      return bad_input(path, "not an OpenVDB file: expected its magic number at byte 0");
-    const uint32_t version = number<uint32_t>();
-    if (version < openvdb::OPENVDB_FILE_VERSION_NODE_MASK_COMPRESSION)
-      return bad_input(path, fmt::format("OpenVDB file version {}: expected 222 or later", version));
-    skip(8);  // library version
-    const bool offsets = number<char>() != 0;
-    skip(36);  // UUID
-    metadata();
-    const int32_t count = number<int32_t>();
-    std::vector<GridEntry> entries;
-    for (int32_t i = 0; i < count; ++i) {
-      GridEntry entry;
-      entry.descriptor = stream_.tellg();
-      entry.name = text();
-      entry.name = entry.name.substr(0, entry.name.find('\x1e'));  // what follows numbers grids of one name
-      entry.type = text();
-      entry.parent = text();
-      entry.start = number<int64_t>();
-      skip(8);
-      entry.end = number<int64_t>();
-      const int64_t here = stream_.tellg();
-      if (!offsets) entry.start = here, entry.end = size_;
-      if (entry.start < here || entry.end < entry.start || entry.end > size_)
-        return bad_input(
-            path, fmt::format("grid {} spans bytes {} to {}: expected {} to at most {}, the file's size",
-                              entry.name, entry.start, entry.end, here, size_));
-      stream_.seekg(entry.start);
-      skip(4);  // compression
-      metadata();
-      text();  // type of the transform
-      stream_.seekg(entry.end);
-      entries.push_back(std::move(entry));
-      if (!offsets) break;  // written to a stream: no way to the next grid but through this one
-    }
-    return entries;
-  }
-
- private:
-  template <class T>
-  T number() {
-    T value;
-    stream_.read(reinterpret_cast<char*>(&value), sizeof value);
-    return value;
-  }
-  void skip(int64_t bytes) {
-    if (bytes > size_ - stream_.tellg()) throw std::ios_base::failure("length exceeds the file");
-    stream_.seekg(bytes, std::ios_base::cur);
-  }
-  std::string text() {
-    const uint32_t length = number<uint32_t>();
-    if (length > size_ - stream_.tellg()) throw std::ios_base::failure("length exceeds the file");
-    std::string value(length, '\0');
-    if (length) stream_.read(value.data(), length);
-    return value;
-  }
-  /// Names, types and values. The types that are registered take their size, whatever the file says.
-  void metadata() {
-    for (uint32_t count = number<uint32_t>(); count > 0; --count) {
-      text();
-      const std::string type = text();
-      const uint32_t length = number<uint32_t>();
-      if ((type == "vec3i" && length != 12) || (type == "bool" && length != 1))
-        throw std::ios_base::failure("metadata of another length than its type");
-      skip(length);
-    }
-  }
-
-  std::istream& stream_;
-  int64_t size_;
-};
 
 /// io::File hides its streams, and with them what goes wrong on them: a short read yields zeros and a full
 /// disk a cut file.
@@ -218,9 +127,9 @@ template <class Kind>
 class VdbSource : public VolumeSource {
   using Grid = typename Kind::Grid;
   using Tree = typename Grid::TreeType;
-  using Leaf = typename Tree::LeafNodeType;  // 8^3 voxels
-  using Lower =
-      typename Tree::RootNodeType::ChildNodeType::ChildNodeType;  // 16^3 leaves or tiles: 128^3 voxels
+  using Leaf = typename Tree::LeafNodeType;                  // 8^3 voxels
+  using Upper = typename Tree::RootNodeType::ChildNodeType;  // 32^3 of the next, or tiles: 4096^3 voxels
+  using Lower = typename Upper::ChildNodeType;               // 16^3 leaves or tiles: 128^3 voxels
 
  public:
   static SourceResult create(const std::string& path, typename Grid::Ptr grid, Context& ctx) {
@@ -297,13 +206,17 @@ class VdbSource : public VolumeSource {
       if (!common) common = v;
       return *common == v;
     };
-    const bool same = each_block<Lower::DIM>(in_index_space(box), [&](Coord at, const Box& part) {
-      const Lower* lower = grid_->tree().template probeConstNode<Lower>(at);
-      if (!lower) return agrees(tile(at));
-      return each_block<Leaf::DIM>(part, [&](Coord leaf_at, const Box&) {
-        const openvdb::Index n = Lower::coordToOffset(leaf_at);
-        return !lower->isChildMaskOn(n) &&
-               agrees(Kind::voxel(lower->getTable()[n].getValue(), lower->isValueMaskOn(n)));
+    // Where there is no node of 4096 voxels a side, one tile speaks for all of it.
+    const bool same = each_block<Upper::DIM>(in_index_space(box), [&](Coord corner, const Box& large) {
+      if (!grid_->tree().template probeConstNode<Upper>(corner)) return agrees(tile(corner));
+      return each_block<Lower::DIM>(large, [&](Coord at, const Box& part) {
+        const Lower* lower = grid_->tree().template probeConstNode<Lower>(at);
+        if (!lower) return agrees(tile(at));
+        return each_block<Leaf::DIM>(part, [&](Coord leaf_at, const Box&) {
+          const openvdb::Index n = Lower::coordToOffset(leaf_at);
+          return !lower->isChildMaskOn(n) &&
+                 agrees(Kind::voxel(lower->getTable()[n].getValue(), lower->isValueMaskOn(n)));
+        });
       });
     });
     return same ? common : std::nullopt;
@@ -435,6 +348,7 @@ SourceResult open_grid(const std::string& path, const std::string& name, Context
 
 template <class Kind>
 class VdbSink : public VolumeSink {
+ protected:
   using Grid = typename Kind::Grid;
   using Value = typename Grid::ValueType;
   using Leaf = typename Grid::TreeType::LeafNodeType;
@@ -470,7 +384,7 @@ class VdbSink : public VolumeSink {
                  {std::min(x + 8, info_.dims.x), std::min(y + 8, info_.dims.y), std::min((z | 7) + 1, z1)}},
                 z0, voxels));
     } catch (const std::bad_alloc&) {
-      return fail(ErrorCode::limit, file_->name(), "not enough memory for the OpenVDB grid");
+      return no_memory();
     } catch (const std::exception& error) {
       return fail(ErrorCode::internal, file_->name(), one_line(error.what()));
     }
@@ -496,6 +410,20 @@ class VdbSink : public VolumeSink {
     }
     return file_->commit();
   }
+
+ protected:
+  /// The leaf around a voxel, made where there is none.
+  Result<Leaf*> leaf_at(const Coord& at) {
+    if (Leaf* const leaf = grid_->tree().probeLeaf(at)) return leaf;
+    VOX_CHECK(memory_->reserve(leaf_bytes, "the OpenVDB grid"));
+    reserved_ += leaf_bytes;
+    return grid_->tree().touchLeaf(at);
+  }
+  Status no_memory() const {
+    return fail(ErrorCode::limit, file_->name(), "not enough memory for the OpenVDB grid");
+  }
+  /// Nothing more will come.
+  void end() { next_ = info_.dims.z; }
 
  private:
   /// A voxel's value, and whether it is active: whatever is not background or void.
@@ -527,12 +455,7 @@ class VdbSink : public VolumeSink {
           Value value;
           if (!value_of(row + x * bytes, value)) continue;
           if (!leaf) {
-            leaf = grid_->tree().probeLeaf(at);
-            if (!leaf) {
-              VOX_CHECK(memory_->reserve(leaf_bytes, "the OpenVDB grid"));
-              reserved_ += leaf_bytes;
-              leaf = grid_->tree().touchLeaf(at);
-            }
+            VOX_TRY(leaf, leaf_at(at));
           }
           leaf->setValueOn(static_cast<openvdb::Index>((x & 7) << 6 | (y & 7) << 3 | (z & 7)), value);
         }
@@ -549,11 +472,57 @@ class VdbSink : public VolumeSink {
   int64_t next_ = 0;
 };
 
-SinkResult create_grid(const std::string& path, const VolumeInfo& info, bool force, Context& ctx) {
+/// The same grid from voxels one by one, so that void costs nothing.
+class VdbVoxelSink final : public VoxelSink, private VdbSink<Colour> {
+ public:
+  using VdbSink::VdbSink;
+
+  Status add(std::span<const ModelVoxel> voxels) override {
+    try {
+      Leaf* leaf = nullptr;
+      Coord known;
+      for (const ModelVoxel& v : voxels) {
+        const Coord at(v.place[0], v.place[1], v.place[2]), corner = at & ~7;
+        if (!leaf || corner != known) {
+          VOX_TRY(leaf, leaf_at(at));
+          known = corner;
+        }
+        Value value;
+        for (int c = 0; c < 3; ++c) value[c] = static_cast<float>(v.color[static_cast<size_t>(c)]) / 255.0f;
+        leaf->setValueOn(Leaf::coordToOffset(at), value);
+      }
+    } catch (const std::bad_alloc&) {
+      return no_memory();
+    }
+    return {};
+  }
+  Status finish() override {
+    end();
+    return VdbSink::finish();
+  }
+};
+
+Status check_grid(const std::string& path, const VolumeInfo& info) {
   for (int axis = 0; axis < 3; ++axis)
     if (info.dims[axis] > INT32_MAX)
       return fail(ErrorCode::usage, path, "OpenVDB grids have at most 2^31 - 1 voxels a side");
   if (path == "-") return bad_usage("an OpenVDB file cannot be written to standard output: name a file");
+  return {};
+}
+
+VoxelSinkResult create_voxels(const std::string& path, const VolumeInfo& info, bool force, Context& ctx) {
+  VOX_CHECK(check_grid(path, info));
+  VOX_TRY(auto file, OutputFile::create(path, force));
+  try {
+    register_types();
+    return std::make_unique<VdbVoxelSink>(info, std::move(file), ctx.memory);
+  } catch (const std::exception& error) {
+    return fail(ErrorCode::output, path, one_line(error.what()));
+  }
+}
+
+SinkResult create_grid(const std::string& path, const VolumeInfo& info, bool force, Context& ctx) {
+  VOX_CHECK(check_grid(path, info));
   VOX_TRY(auto file, OutputFile::create(path, force));
   try {
     register_types();
@@ -564,7 +533,7 @@ SinkResult create_grid(const std::string& path, const VolumeInfo& info, bool for
   }
 }
 
-const ModuleTable table{.open = open_grid, .create = create_grid};
+const ModuleTable table{.open = open_grid, .create = create_grid, .create_voxels = create_voxels};
 
 }  // namespace
 }  // namespace voxkit

@@ -94,6 +94,13 @@ SinkResult create_vdb(const std::string& path, const VolumeInfo& info, bool forc
                    ctx);
 }
 
+VoxelSinkResult create_vdb_voxels(const std::string& path, const VolumeInfo& info, bool force, Context& ctx) {
+  auto table =
+      load_module(module_folder(), {"openvdb", "writing .vdb files", "libopenvdb-dev", ErrorCode::usage});
+  if (!table) return fail(table.error().code, path, table.error().what);
+  return (*table)->create_voxels(path, info, force, ctx);
+}
+
 SourceResult open_dicom(const std::string& folder, Context& ctx) {
   return open_by({"dicom", "reading DICOM slices", "libgdcm-dev"}, folder, {}, ctx);
 }

@@ -4,13 +4,12 @@
 #include "formats/convert.h"
 #include "formats/copy.h"
 #include "formats/open_volume.h"
-#include "formats/ply_points.h"
 #include "formats/readers.h"
-#include "libcolor/morton.h"
 #include "tools/common/input.h"
 #include "tools/common/json.h"
 #include "tools/common/main.h"
 #include "tools/common/retype.h"
+#include "tools/common/surface_output.h"
 #include "tools/common/tiles.h"
 
 namespace voxkit::cli {
@@ -27,9 +26,11 @@ struct Options {
 
 void declare(CommandLine& line, Options& o) {
   line.argument("FILE", "Compressed volume (.svmm, .vqv, .dagc), or -", o.input);
-  line.text("-o,--output", "OUT",
-            "Volume file, pattern such as slice-%04d.tif, or -; of a .dagc file also points (.ply)", o.output,
-            true);
+  line.text(
+      "-o,--output", "OUT",
+      "Volume file, pattern such as slice-%04d.tif, or -; of a .dagc file also points (.ply) or MagicaVoxel "
+      "models (.vox; more than 255 colors become the nearest of a palette)",
+      o.output, true);
   line.option("--roi", "BOX", "X0,Y0,Z0,X1,Y1,Z1: part of the volume, half open, in voxels of level 0",
               box(o.roi));
   line.option("--level", "N", "Stop at this mip level; 0: all detail", integer(o.level, 0, 64));
@@ -42,29 +43,15 @@ void declare(CommandLine& line, Options& o) {
                        "Values that a narrower type's ends stand for (default: least and greatest value)");
 }
 
-/// The voxels of a surface as points where their centres are.
-Result<int> write_points(const Options& o, const color::Volume& volume, Run& run) {
+/// All voxels of a surface, one by one: void costs nothing.
+Result<int> write_voxels(const Options& o, const color::Volume& volume, Run& run) {
   const VolumeInfo& info = volume.info();
-  VOX_TRY(auto writer, PlyPointWriter::create(o.output, volume.params().leaf_voxels, run.options.force));
   run.stage("decode");
   const double start = run.seconds();
-  std::vector<ColoredPoint> points;
-  VOX_CHECK(volume.for_each_voxel(
-      [&](std::span<const color::SurfaceVoxel> voxels) -> Status {
-        points.clear();
-        for (const color::SurfaceVoxel& voxel : voxels) {
-          const auto at = color::morton_place(voxel.place);
-          ColoredPoint& point = points.emplace_back();
-          for (size_t a = 0; a < 3; ++a)
-            point.at[a] = static_cast<float>(info.origin[a] + info.spacing[a] * at[static_cast<int>(a)]);
-          point.color = {voxel.color.r, voxel.color.g, voxel.color.b};
-        }
-        return writer.add(points);
-      },
-      run.ctx));
-  VOX_CHECK(writer.finish());
+  VOX_CHECK(write_surface(volume, o.output, run.options.force, run.ctx));
   const double seconds = run.seconds() - start;
-  run.note(fmt::format("{}: {} points in {:.2f} s", o.output, volume.params().leaf_voxels, seconds));
+  run.note(fmt::format("{}: {} {} in {:.2f} s", o.output, volume.params().leaf_voxels,
+                       has_ending(o.output, ".ply") ? "points" : "voxels", seconds));
   if (run.options.json) {
     Json json = Json::result();
     json.set("tool", run.tool).set("version", version_text()).set("input", o.input).set("output", o.output);
@@ -105,17 +92,16 @@ Result<int> work(const Options& o, Run& run) {
     return bad_usage("--json and the output - both use standard output");
   if (o.tiles) return write_images(o, run);
   VOX_CHECK(check_distinct(o.input, o.output));
-  const bool points = has_ending(o.output, ".ply");
-  if (points && (o.roi || o.type))
-    return bad_usage("--roi, --type: not of points: leave them out, or name a volume");
-  VOX_CHECK(points ? check_output(o.output, run.options.force)
-                   : check_volume_output(o.output, run.options.force));
+  const bool only_surface = is_only_surface_output(o.output);
+  if (only_surface && (o.roi || o.type))
+    return bad_usage("--roi, --type: not of points and models: leave them out, or name a volume");
+  VOX_CHECK(only_surface ? check_output(o.output, run.options.force)
+                         : check_volume_output(o.output, run.options.force));
   VOX_TRY(Input input, open_compressed(o.input, o.level, run.ctx));
-  if (points) {
-    if (!input.color)
-      return fail(ErrorCode::usage, o.input, "points are made of surfaces: expected a .dagc file");
-    return write_points(o, *input.color, run);
-  }
+  if (only_surface && !input.color)
+    return fail(ErrorCode::usage, o.input, "points and models are made of surfaces: expected a .dagc file");
+  if (input.color && is_surface_output(o.output) && !o.roi && !o.type)
+    return write_voxels(o, *input.color, run);
   auto source = std::move(input.source);
   if (o.roi) {
     const VolumeInfo whole = input.svmm ? input.svmm->info() : source->info();
@@ -165,6 +151,7 @@ int main(int argc, char** argv) {
       "  vox-decode head.svmm -o small.nrrd --level 2\n"
       "  vox-decode house.dagc -o house.ply\n"
       "  vox-decode house.dagc -o tile-%04d.png --tiles\n"
+      "  vox-decode house.dagc -o house.vox\n"
       "  vox-decode head.svmm -o slice-%04d.png --type u8\n",
       [&](CommandLine& line) { declare(line, options); }, [&](Run& run) { return work(options, run); });
 }

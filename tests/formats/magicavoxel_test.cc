@@ -152,6 +152,47 @@ TEST_F(MagicaVoxel, BrokenFilesAreRefused) {
   expect_refused(file(one + transform(0, 1, {{"_r", "5"}}) + shape(1, 0)), "rotation");
 }
 
+TEST_F(MagicaVoxel, WhatIsWrittenIsReadInItsPlace) {
+  // Several models on each axis, the last ones smaller.
+  const Index3 dims(300, 513, 257);
+  const std::vector<Color> palette{{1, 2, 3}, {0, 0, 0}, {255, 254, 253}};
+  std::map<Place, Color> expected;
+  std::vector<IndexedVoxel> voxels;
+  uint32_t random = 1;
+  for (int i = 0; i < 3000; ++i) {
+    IndexedVoxel v{};
+    for (size_t a = 0; a < 3; ++a) {
+      random = random * 1664525 + 1013904223;
+      const auto side = static_cast<uint32_t>(dims[static_cast<Index3::length_type>(a)]);
+      v.place[a] = static_cast<int32_t>((random >> 8) % side);
+    }
+    v.color = static_cast<uint8_t>(i % 3);
+    if (expected.emplace(v.place, palette[v.color]).second) voxels.push_back(v);
+  }
+  const std::string path =
+      (std::filesystem::temp_directory_path() / ("voxkit-" + std::to_string(getpid()) + "-written.vox"))
+          .string();
+  auto writer = create_magicavoxel(path, dims, voxels.size(), palette, false, ctx_);
+  ASSERT_TRUE(writer) << writer.error().what;
+  ASSERT_TRUE((*writer)->add(std::span(voxels).first(1000)));
+  ASSERT_TRUE((*writer)->add(std::span(voxels).subspan(1000)));
+  EXPECT_FALSE(std::filesystem::exists(path));
+  ASSERT_TRUE((*writer)->finish());
+  const auto scene = read_magicavoxel(path, ctx_);
+  std::filesystem::remove(path);
+  ASSERT_TRUE(scene) << scene.error().what;
+  std::map<Place, Color> found;
+  for (const ModelVoxel& v : scene->voxels) found.emplace(v.place, v.color);
+  EXPECT_EQ(found, expected);
+
+  for (const auto& [side, count] :
+       {std::pair<int64_t, uint64_t>{(1 << 20) + 1, 1}, {100, uint64_t{1} << 29}}) {
+    const auto large = create_magicavoxel(path, Index3(side, 9, 9), count, palette, false, ctx_);
+    ASSERT_FALSE(large);
+    EXPECT_EQ(large.error().code, ErrorCode::limit);
+  }
+}
+
 /// Groups that have the next one ten times over: 10^9 models.
 TEST_F(MagicaVoxel, ABombOfNodesReachesTheLimit) {
   std::string nodes = model(1, 1, 1, {{0, 0, 0, 1}});

@@ -104,6 +104,50 @@ TEST_F(OpenVdb, IntegersAreKeptAsTheirSampleValues) {
   }
 }
 
+TEST_F(OpenVdb, VoxelsOneByOneAreTheSameAsSlabs) {
+  const VolumeInfo info = make_info({20, 300, 9}, VoxelFormat::rgba32);
+  Bytes voxels(static_cast<size_t>(info.dims.x * info.dims.y * info.dims.z * 4));
+  std::vector<ModelVoxel> list;
+  for (int i = 0; i < 500; ++i) {
+    const std::array<int32_t, 3> at{static_cast<int32_t>(random_() % 20),
+                                    static_cast<int32_t>(random_() % 300),
+                                    static_cast<int32_t>(random_() % 9)};
+    std::byte* const voxel = voxels.data() + ((at[2] * 300 + at[1]) * 20 + at[0]) * 4;
+    if (voxel[3] != std::byte{0}) continue;
+    const ModelVoxel v{at, {static_cast<uint8_t>(random_()), static_cast<uint8_t>(i), 7}};
+    for (size_t c = 0; c < 3; ++c) voxel[c] = std::byte{v.color[c]};
+    voxel[3] = std::byte{255};
+    list.push_back(v);
+  }
+  auto sink = create_vdb_voxels(path("one.vdb"), info, true, ctx_);
+  ASSERT_TRUE(sink) << sink.error().what;
+  ASSERT_TRUE((*sink)->add(std::span(list).first(200)));
+  ASSERT_TRUE((*sink)->add(std::span(list).subspan(200)));
+  EXPECT_FALSE(std::filesystem::exists(path("one.vdb")));
+  ASSERT_TRUE((*sink)->finish());
+  ASSERT_TRUE(write_vdb("slabs.vdb", info, voxels));
+  Bytes one, slabs;
+  const auto source = read_vdb("one.vdb", one);
+  ASSERT_TRUE(source && read_vdb("slabs.vdb", slabs));
+  EXPECT_EQ(source->info().dims, info.dims);
+  EXPECT_EQ(one, slabs);
+  EXPECT_EQ(one, voxels);
+}
+
+TEST_F(OpenVdb, HugeVolumesOfFewVoxelsAreFast) {
+  const VolumeInfo info = make_info({1 << 20, 1 << 20, 1 << 20}, VoxelFormat::rgba32);
+  auto sink = create_vdb_voxels(path("a.vdb"), info, true, ctx_);
+  ASSERT_TRUE(sink);
+  const std::vector<ModelVoxel> list{{{5, 6, 7}, {1, 2, 3}}, {{1000000, 1000001, 1000002}, {4, 5, 6}}};
+  ASSERT_TRUE((*sink)->add(list));
+  ASSERT_TRUE((*sink)->finish());
+  const auto source = open_vdb(path("a.vdb"), {}, ctx_);
+  ASSERT_TRUE(source);
+  // A walk over all places would not end.
+  EXPECT_FALSE((*source)->uniform((*source)->info().box()));
+  EXPECT_EQ((*source)->uniform({{0, 0, 4096}, {1 << 19, 1 << 19, 1 << 19}}), Voxel{});
+}
+
 TEST_F(OpenVdb, ColoursComeBackAndVoidIsBlack) {
   const VolumeInfo rgba = make_info({20, 11, 9}, VoxelFormat::rgba32);
   Bytes voxels = random_voxels(rgba);

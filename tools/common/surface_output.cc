@@ -1,0 +1,108 @@
+#include "tools/common/surface_output.h"
+
+#include <algorithm>
+#include <vector>
+
+#include "formats/magicavoxel.h"
+#include "formats/ply_points.h"
+#include "formats/readers.h"
+#include "formats/reservation.h"
+#include "libcolor/morton.h"
+#include "libcolor/palette.h"
+
+namespace voxkit::cli {
+namespace {
+
+using Voxels = std::span<const color::SurfaceVoxel>;
+
+std::array<int32_t, 3> place_of(const color::SurfaceVoxel& voxel) {
+  const auto at = color::morton_place(voxel.place);
+  return {static_cast<int32_t>(at.x), static_cast<int32_t>(at.y), static_cast<int32_t>(at.z)};
+}
+
+Status write_points(const color::Volume& volume, const std::string& name, bool force, Context& ctx) {
+  const VolumeInfo& info = volume.info();
+  VOX_TRY(auto writer, PlyPointWriter::create(name, volume.params().leaf_voxels, force));
+  std::vector<ColoredPoint> points;
+  VOX_CHECK(volume.for_each_voxel(
+      [&](Voxels voxels) -> Status {
+        points.clear();
+        for (const color::SurfaceVoxel& voxel : voxels) {
+          const auto at = place_of(voxel);
+          ColoredPoint& point = points.emplace_back();
+          for (size_t a = 0; a < 3; ++a)
+            point.at[a] = static_cast<float>(info.origin[a] + info.spacing[a] * at[a]);
+          point.color = {voxel.color.r, voxel.color.g, voxel.color.b};
+        }
+        return writer.add(points);
+      },
+      ctx));
+  return writer.finish();
+}
+
+Status write_grid(const color::Volume& volume, const std::string& name, bool force, Context& ctx) {
+  VOX_TRY(auto sink, create_vdb_voxels(name, volume.info(), force, ctx));
+  std::vector<ModelVoxel> run;
+  VOX_CHECK(volume.for_each_voxel(
+      [&](Voxels voxels) -> Status {
+        run.clear();
+        for (const color::SurfaceVoxel& v : voxels)
+          run.push_back({place_of(v), {v.color.r, v.color.g, v.color.b}});
+        return sink->add(run);
+      },
+      ctx));
+  return sink->finish();
+}
+
+Status write_models(const color::Volume& volume, const std::string& name, bool force, Context& ctx) {
+  constexpr uint32_t most_colors = 255;
+  constexpr int effort = 3;
+  const uint64_t count = volume.params().leaf_voxels;
+  // What the file cannot hold is refused before anything is decoded.
+  VOX_CHECK(check_magicavoxel(name, volume.info().dims, count));
+  color::Palette palette;
+  {
+    VOX_TRY(const Reservation memory,
+            Reservation::take(count * sizeof(color::Rgb), "the colors of a surface", ctx));
+    std::vector<color::Rgb> colors;
+    colors.reserve(count);
+    VOX_CHECK(volume.for_each_voxel(
+        [&](Voxels voxels) -> Status {
+          for (const color::SurfaceVoxel& v : voxels) colors.push_back(v.color);
+          return {};
+        },
+        ctx));
+    VOX_TRY(palette, color::Palette::choose(colors, most_colors, effort, ctx));
+  }
+  std::vector<std::array<uint8_t, 3>> chosen;
+  for (const color::Rgb& c : palette.colors()) chosen.push_back({c.r, c.g, c.b});
+  VOX_TRY(auto writer, create_magicavoxel(name, volume.info().dims, count, chosen, force, ctx));
+  std::vector<IndexedVoxel> run;
+  VOX_CHECK(volume.for_each_voxel(
+      [&](Voxels voxels) -> Status {
+        run.clear();
+        for (const color::SurfaceVoxel& v : voxels)
+          run.push_back({place_of(v), static_cast<uint8_t>(palette.index_of(v.color))});
+        return writer->add(run);
+      },
+      ctx));
+  return writer->finish();
+}
+
+}  // namespace
+
+bool is_only_surface_output(const std::string& name) {
+  return has_ending(name, ".ply") || has_ending(name, ".vox");
+}
+
+bool is_surface_output(const std::string& name) {
+  return is_only_surface_output(name) || has_ending(name, ".vdb");
+}
+
+Status write_surface(const color::Volume& volume, const std::string& name, bool force, Context& ctx) {
+  if (has_ending(name, ".ply")) return write_points(volume, name, force, ctx);
+  if (has_ending(name, ".vdb")) return write_grid(volume, name, force, ctx);
+  return write_models(volume, name, force, ctx);
+}
+
+}  // namespace voxkit::cli

@@ -1,0 +1,21 @@
+// Compressed surfaces as files of points, of models and of sparse grids.
+#pragma once
+
+#include <string>
+
+#include "libcolor/color.h"
+
+namespace voxkit::cli {
+
+/// Whether a surface can be written as a file of that name: .ply, .vox or .vdb. The first two hold nothing
+/// else.
+bool is_surface_output(const std::string& name);
+bool is_only_surface_output(const std::string& name);
+
+/// Writes all voxels of a surface. As .ply: points where their centres are. As .vdb: the active voxels of a
+/// Vec3s grid. As .vox: models; where there are more than 255 colours, each becomes the nearest of a palette.
+/// Memory: of .vdb, 6 KiB for each cube of 8 voxels a side that has any; of .vox, 11 bytes a voxel and 64
+/// MiB.
+Status write_surface(const color::Volume& volume, const std::string& name, bool force, Context& ctx);
+
+}  // namespace voxkit::cli
