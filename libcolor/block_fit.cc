@@ -121,19 +121,24 @@ Fit Fitter::fit(uint32_t first, uint32_t last, int bits) const {
   return bits == 0 ? fit_single(first, last) : fit_line(first, last, bits);
 }
 
-Distances Fitter::distances(const Fit& fit, uint32_t first, uint32_t last, int bits, uint8_t* weights) const {
+[[gnu::always_inline]] inline Distances Fitter::distances(const Fit& fit, uint32_t first, uint32_t last,
+                                                          int bits, uint8_t* weights) const {
   const uint32_t most = bits == 0 ? 1 : (1u << bits) - 1;
-  const BlockKernels& kernels = block_kernels(true);
   if (colors_.space() == ErrorSpace::rgb)
-    return kernels.distances(run_of(colors_, first, last), floats(fit.a), floats(fit.b),
-                             static_cast<int>(most), allowed_, weights);
+    return kernels_.distances(run_of(colors_, first, last), floats(fit.a), floats(fit.b),
+                              static_cast<int>(most), allowed_, weights);
+  return lab_distances(fit, first, last, most, weights);
+}
+
+[[gnu::noinline]] Distances Fitter::lab_distances(const Fit& fit, uint32_t first, uint32_t last,
+                                                  uint32_t most, uint8_t* weights) const {
   std::array<LabPoint, 1 << most_weight_bits> steps;
   const uint32_t count = fit.a == fit.b ? 1 : most + 1;
   for (uint32_t w = 0; w < count; ++w) steps[w] = lab_colors().point(mix(fit.a, fit.b, w, most));
   const ColorRun run{
       {colors_.lab_channel(0) + first, colors_.lab_channel(1) + first, colors_.lab_channel(2) + first},
       last - first};
-  return kernels.nearest(run, steps.data(), static_cast<int>(count), allowed_, weights);
+  return kernels_.nearest(run, steps.data(), static_cast<int>(count), allowed_, weights);
 }
 
 Fit Fitter::fit_single(uint32_t first, uint32_t last) const {
@@ -169,7 +174,7 @@ Fit Fitter::fit_line(uint32_t first, uint32_t last, int bits) const {
   const double reach = std::sqrt(static_cast<double>(allowed_)) + rounding;
   const bool rgb = colors_.space() == ErrorSpace::rgb;
   if (rgb && line.residual > reach * reach) return best;
-  const Extent extent = block_kernels(true).extent(run, line.axis);
+  const Extent extent = kernels_.extent(run, line.axis);
   const auto center = static_cast<float>(line.mean[0] * line.axis[0] + line.mean[1] * line.axis[1] +
                                          line.mean[2] * line.axis[2]);
   const float lo = extent.least - center, hi = extent.most - center;

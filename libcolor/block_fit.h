@@ -61,9 +61,12 @@ class Fitter {
   Fit fit_line(uint32_t first, uint32_t last, int bits) const;
   /// How far decoded colours are from what they were; `weights`: if not null, those that they get.
   Distances distances(const Fit& fit, uint32_t first, uint32_t last, int bits, uint8_t* weights) const;
+  Distances lab_distances(const Fit& fit, uint32_t first, uint32_t last, uint32_t most,
+                          uint8_t* weights) const;
   Rgb quantised(const std::array<float, 3>& color) const;
 
   const MacroColors& colors_;
+  const BlockKernels& kernels_ = block_kernels(true);
   Endpoints endpoints_;
   uint32_t allowed_;
   int tries_;

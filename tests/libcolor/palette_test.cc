@@ -17,19 +17,16 @@
 namespace voxkit::color {
 namespace {
 
-struct Fixture {
-  MemoryBudget memory;
+/// A palette, and memory for it.
+Palette palette_of(std::span<const Rgb> colors, uint32_t most, int effort = 3, int threads = 2) {
+  static MemoryBudget memory;
   Context ctx;
-  explicit Fixture(int threads = 2) {
-    ctx.memory = &memory;
-    ctx.threads = threads;
-  }
-  Palette palette(std::span<const Rgb> colors, uint32_t most, int effort = 3) {
-    auto made = Palette::choose(colors, most, effort, ctx);
-    EXPECT_TRUE(made);
-    return std::move(*made);
-  }
-};
+  ctx.memory = &memory;
+  ctx.threads = threads;
+  auto made = Palette::choose(colors, most, effort, ctx);
+  EXPECT_TRUE(made);
+  return std::move(*made);
+}
 
 uint64_t squared(Rgb a, Rgb b) {
   const int r = a.r - b.r, g = a.g - b.g, c = a.b - b.b;
@@ -43,7 +40,7 @@ uint64_t error_of(std::span<const Rgb> colors, const Palette& palette) {
 
 TEST(Palette, FewColorsStayAsTheyAre) {
   const std::vector<Rgb> colors = {{9, 8, 7}, {0, 0, 1}, {9, 8, 7}, {255, 255, 255}};
-  const Palette palette = Fixture().palette(colors, 3);
+  const Palette palette = palette_of(colors, 3);
   EXPECT_EQ(std::vector<Rgb>(palette.colors().begin(), palette.colors().end()),
             (std::vector<Rgb>{{0, 0, 1}, {9, 8, 7}, {255, 255, 255}}));
   for (const Rgb c : colors) EXPECT_EQ(palette.colors()[palette.index_of(c)], c);
@@ -53,7 +50,7 @@ TEST(Palette, EveryColorGetsTheNearest) {
   for (const ColorCase& c : color_cases(3000, 1))
     for (const uint32_t most : {1u, 2u, 7u, 100u, 900u}) {
       SCOPED_TRACE(c.name + ", " + std::to_string(most));
-      const Palette palette = Fixture().palette(c.colors, most, 1);
+      const Palette palette = palette_of(c.colors, most, 1);
       const auto chosen = palette.colors();
       ASSERT_LE(chosen.size(), most);
       ASSERT_GE(chosen.size(), 1u);
@@ -72,25 +69,24 @@ TEST(Palette, MoreColorsAndRoundsHaveLessError) {
   const std::vector<Rgb> colors = color_cases(20000, 2)[5].colors;
   uint64_t last = ~uint64_t{0};
   for (const uint32_t most : {1u, 4u, 16u, 64u, 256u, 1024u}) {
-    const uint64_t error = error_of(colors, Fixture().palette(colors, most));
+    const uint64_t error = error_of(colors, palette_of(colors, most));
     EXPECT_LT(error, last / 2);
     last = error;
   }
   // The mean has the least error of single colours, but for its rounding.
-  const Palette one = Fixture().palette(colors, 1);
+  const Palette one = palette_of(colors, 1);
   const uint64_t least = error_of(colors, one);
   for (const Rgb other : {Rgb{0, 0, 0}, Rgb{128, 128, 128}, colors[0]}) {
     uint64_t sum = 0;
     for (const Rgb c : colors) sum += squared(c, other);
     EXPECT_LE(least, sum);
   }
-  EXPECT_LE(error_of(colors, Fixture().palette(colors, 64, 9)),
-            error_of(colors, Fixture().palette(colors, 64, 1)));
+  EXPECT_LE(error_of(colors, palette_of(colors, 64, 9)), error_of(colors, palette_of(colors, 64, 1)));
 }
 
 TEST(Palette, DoesNotDependOnThreads) {
   const std::vector<Rgb> colors = color_cases(40000, 3)[1].colors;
-  const Palette one = Fixture(1).palette(colors, 500), five = Fixture(5).palette(colors, 500);
+  const Palette one = palette_of(colors, 500, 3, 1), five = palette_of(colors, 500, 3, 5);
   EXPECT_TRUE(
       std::equal(one.colors().begin(), one.colors().end(), five.colors().begin(), five.colors().end()));
 }
@@ -255,7 +251,7 @@ TEST(Palette, PartsComeBack) {
     for (const ColorCase& c : color_cases(size, 7))
       for (const uint32_t most : {1u, 300u, 65536u}) {
         SCOPED_TRACE(c.name + ", " + std::to_string(size) + " colors, palette of " + std::to_string(most));
-        const Palette palette = Fixture().palette(c.colors, most, 1);
+        const Palette palette = palette_of(c.colors, most, 1);
         const Part made(c.colors, palette, 3);
         ASSERT_TRUE(made.view.valid());
         const auto count = static_cast<uint32_t>(palette.colors().size());
@@ -280,9 +276,45 @@ TEST(Palette, PartsComeBack) {
       }
 }
 
+TEST(Palette, DamagedPartsAreReadWithoutHarm) {
+  std::mt19937_64 random(9);
+  const std::vector<Rgb> colors = color_cases(20000, 9)[5].colors;
+  const Palette palette = palette_of(colors, 200);
+  const Part made(colors, palette, 2);
+  const std::vector<std::byte>& bytes = made.part.bytes;
+  int valid = 0, sound = 0;
+  for (int round = 0; round < 1500; ++round) {
+    // Exactly the bytes that are there, on the heap.
+    std::vector<std::byte> copy(
+        bytes.begin(),
+        round % 3 == 0 ? bytes.begin() + static_cast<std::ptrdiff_t>(random() % bytes.size()) : bytes.end());
+    copy.shrink_to_fit();
+    if (round % 3 != 0)
+      for (int i = 0; i < 1 + round % 4; ++i)
+        copy[random() % (round % 2 == 0 ? std::min<size_t>(copy.size(), 2000) : copy.size())] =
+            static_cast<std::byte>(random());
+    const PaletteView view(copy.data(), copy.size(), static_cast<uint32_t>(colors.size()), 8);
+    valid += view.valid() ? 1 : 0;
+    const bool checked = check_palette_part(view, made.bytes.colors).empty();
+    sound += checked ? 1 : 0;
+    PaletteReader reader;
+    reader.open(view, made.bytes);
+    for (uint32_t i = 0; i < colors.size(); i += 1 + static_cast<uint32_t>(random() % 200)) {
+      const Rgb color = reader.color(i);
+      // What has been checked has only colours of the palette.
+      if (checked) {
+        ASSERT_NE(std::find(palette.colors().begin(), palette.colors().end(), color), palette.colors().end());
+      }
+    }
+  }
+  EXPECT_GT(valid, 500);
+  EXPECT_GT(valid - sound, 100);
+  EXPECT_GT(sound, 100);
+}
+
 TEST(Palette, MoreEffortIsSmaller) {
   const std::vector<Rgb> colors = color_cases(100000, 8)[4].colors;
-  const Palette palette = Fixture().palette(colors, 256);
+  const Palette palette = palette_of(colors, 256);
   EXPECT_LT(encode_palette_part(colors, palette, 6).bytes.size(),
             encode_palette_part(colors, palette, 1).bytes.size());
 }
