@@ -171,6 +171,8 @@ void Tile::add_leaves() {
       continue;
     forest.leaves_in(tree, extent_.lo, extent_.hi, [&](const Leaf& leaf) {
       const LeafShape shape(leaf, tree, edge_);
+      if (const int32_t rise = shape.rise(); shape.y + rise < extent_.lo[1] || shape.y - rise > extent_.hi[1])
+        return;
       if (shape.x + shape.length < xs_[1] || shape.x - shape.length > xs_[width] ||
           shape.z + shape.length < zs_[1] || shape.z - shape.length > zs_[width])
         return;

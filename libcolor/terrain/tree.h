@@ -4,6 +4,7 @@
 #include <algorithm>
 #include <array>
 #include <cstdint>
+#include <cstdlib>
 #include <span>
 #include <vector>
 
@@ -44,6 +45,8 @@ struct LeafShape {
   /// At least as wide as a voxel of that edge, up to half a metre.
   LeafShape(const Leaf& leaf, const Tree& tree, int32_t voxel);
   int32_t x, y, z, length;
+  /// No part is further above or below the middle.
+  int32_t rise() const { return ((std::abs(slope_x_) + std::abs(slope_z_)) * length >> 8) + 1; }
   /// Height above a place, or INT32_MIN. `rib` tells how near it is to the middle, 0..256.
   int32_t height(int32_t px, int32_t pz, int32_t& rib) const;
 
