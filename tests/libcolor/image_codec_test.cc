@@ -88,7 +88,9 @@ TEST_P(Images, ErrorsNameTheChunk) {
   options.codec = GetParam();
   ListSource source(sphere_shell(4), Index3(16));
   auto bytes = std::make_shared<std::vector<std::byte>>(compressed(source, options));
-  for (const ChunkEntry& entry : (*Container::open(*bytes, "file", bytes))->table())
+  const auto good = Container::open(*bytes, "file", bytes);
+  ASSERT_TRUE(good);
+  for (const ChunkEntry& entry : (*good)->table())
     if (entry.kind == chunk_kind("COLR")) (*bytes)[entry.offset + 1] ^= std::byte{0xff};
   voxkit::test::reseal(*bytes);
   const auto volume = Volume::open(*Container::open(*bytes, "file", bytes));
