@@ -266,13 +266,24 @@ Result<std::unique_ptr<VolumeSource>> crop(std::unique_ptr<VolumeSource> source,
   return std::make_unique<CroppedSource>(std::move(source), box, std::move(slice));
 }
 
+namespace {
+
+constexpr std::pair<std::string_view, TargetType> target_types[] = {
+    {"u8", {VoxelFormat::density8, SampleType::u8}},    {"i8", {VoxelFormat::density8, SampleType::i8}},
+    {"u16", {VoxelFormat::density16, SampleType::u16}}, {"i16", {VoxelFormat::density16, SampleType::i16}},
+    {"f32", {VoxelFormat::float32, SampleType::f32}},   {"rgba8", {VoxelFormat::rgba32, SampleType::u8}},
+    {"bit", {VoxelFormat::bitmap, SampleType::bit}}};
+
+}  // namespace
+
+std::vector<std::string> target_type_names() {
+  std::vector<std::string> names;
+  for (const auto& [known, type] : target_types) names.emplace_back(known);
+  return names;
+}
+
 Result<TargetType> parse_target_type(std::string_view name) {
-  static constexpr std::pair<std::string_view, TargetType> types[] = {
-      {"u8", {VoxelFormat::density8, SampleType::u8}},    {"i8", {VoxelFormat::density8, SampleType::i8}},
-      {"u16", {VoxelFormat::density16, SampleType::u16}}, {"i16", {VoxelFormat::density16, SampleType::i16}},
-      {"f32", {VoxelFormat::float32, SampleType::f32}},   {"rgba8", {VoxelFormat::rgba32, SampleType::u8}},
-      {"bit", {VoxelFormat::bitmap, SampleType::bit}}};
-  for (const auto& [known, type] : types)
+  for (const auto& [known, type] : target_types)
     if (known == name) return type;
   return bad_usage(fmt::format("unknown type \"{}\": expected u8, i8, u16, i16, f32, rgba8 or bit", name));
 }

@@ -29,6 +29,7 @@ struct TargetType {
 };
 /// "u8", "i8", "u16", "i16", "f32", "rgba8", "bit".
 Result<TargetType> parse_target_type(std::string_view name);
+std::vector<std::string> target_type_names();
 
 /// True if `convert_type` needs the range of the source's values: not every value that the source may have
 /// fits.

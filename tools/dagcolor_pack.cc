@@ -28,7 +28,7 @@ void declare(CommandLine& line, Options& o) {
                 "Mesh (.obj .gltf .glb .ply), points (.ply), model (.vox), RGBA or RGB volume, built-in "
                 "(menger:5, terrain:N, terrain:N:box), or .dagc file",
                 o.input);
-  line.text("-o,--output", "OUT", "Output (.dagc), or -", o.output, true);
+  line.file("-o,--output", "OUT", "Output (.dagc), or -", o.output, true);
   line.option("--resolution", "N", "Of a mesh or points: voxels along the longest side (1024)",
               integer(o.surface.resolution, 1, int64_t{1} << color::most_levels));
   line.option("--surface", "KIND",
@@ -73,7 +73,7 @@ void declare(CommandLine& line, Options& o) {
               one_of(o.colors, {"leaf", "all"}));
   line.option("--counts", "WHERE", "node: counts in nodes; pointer: beside pointers, larger, faster (node)",
               one_of(o.counts, {"node", "pointer"}));
-  line.text("--tiles", "PATTERN",
+  line.file("--tiles", "PATTERN",
             "Of a .dagc file: take the colours from the images that vox-decode --tiles wrote of it, such as "
             "tile-%04d.png; where codec and ending agree they are stored as they are",
             o.tiles);

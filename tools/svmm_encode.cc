@@ -29,7 +29,7 @@ struct Options {
 void declare(CommandLine& line, Options& o) {
   line.argument("INPUT", "Volume file, folder or pattern of images, built-in such as menger:5, or -",
                 o.input);
-  line.text("-o,--output", "OUT", "Output (.svmm), or -", o.output, true);
+  line.file("-o,--output", "OUT", "Output (.svmm), or -", o.output, true);
   line.option("-w,--blockwidth", "W[,W...]",
               "Block widths, powers of two, base level first, the last for all levels above; 0: stepped 2, "
               "4, 8 ... (0)",

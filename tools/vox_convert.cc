@@ -26,7 +26,7 @@ struct Options {
 
 void declare(CommandLine& line, Options& o) {
   line.argument("INPUT", "Volume file, folder, built-in such as menger:5, or -", o.input);
-  line.text("-o,--output", "OUT", "Volume file, pattern such as slice-%04d.tif, or -", o.output, true);
+  line.file("-o,--output", "OUT", "Volume file, pattern such as slice-%04d.tif, or -", o.output, true);
   line.option("--type", "TYPE",
               "u8 i8 u16 i16 f32 rgba8 bit: type of the output; of a .raw INPUT, its own type",
               [&o](const std::string& text) -> Status {

@@ -26,7 +26,7 @@ struct Options {
 
 void declare(CommandLine& line, Options& o) {
   line.argument("FILE", "Compressed volume (.svmm, .vqv, .dagc), or -", o.input);
-  line.text(
+  line.file(
       "-o,--output", "OUT",
       "Volume file, pattern such as slice-%04d.tif, or -; of a .dagc file also points (.ply) or MagicaVoxel "
       "models (.vox; more than 255 colors become the nearest of a palette)",

@@ -81,7 +81,7 @@ Status parse_layers(const std::string& text, std::vector<Layer>& layers) {
 
 void declare(CommandLine& line, Options& o) {
   line.argument("INPUT", "Volume: a file, a built-in such as menger:5, or -", o.input);
-  line.text("-o,--output", "OUT",
+  line.file("-o,--output", "OUT",
             "Picture (.png .tif, or .exr for floats), with --path a pattern such as frame-%04d.png",
             o.output);
   line.option("--size", "WxH", "Size of the picture in pixels (1024x768)",
@@ -98,12 +98,12 @@ void declare(CommandLine& line, Options& o) {
             "orbit:AZ,EL,DIST or lookat:EX,EY,EZ,TX,TY,TZ; the longest side is 1 (orbit:30,20,1.8)",
             o.camera);
   line.option("--fov", "DEG", "Vertical field of view (45)", number(o.fov, 0.01, 179));
-  line.text("--path", "PATH",
+  line.file("--path", "PATH",
             "A camera path: thesis94, orbit:N or FILE.json, as tools/README.md describes it", o.path);
   line.option("--mode", "MODE",
               "surface: shades what a ray meets first; dvr: direct volume rendering, of scalars (surface)",
               one_of(o.mode, {"surface", "dvr"}));
-  line.text("--tf", "TF", "dvr: transfer function, FILE.json or one of " + transfer_presets() + " (gray)",
+  line.file("--tf", "TF", "dvr: transfer function, FILE.json or one of " + transfer_presets() + " (gray)",
             o.transfer);
   line.option("--step", "S", "dvr: distance of samples in smallest voxel edges (0.25)",
               number(o.step, least_step, greatest_step));
@@ -138,11 +138,11 @@ void declare(CommandLine& line, Options& o) {
   declare_range_option(
       line, o.scene.range,
       "Sample values that are shown as 0 and 1, or that a preset spans (default: full scale, or measured)");
-  line.text("--reference", "INPUT2", "Render this as well, and report how far the pictures are apart",
+  line.file("--reference", "INPUT2", "Render this as well, and report how far the pictures are apart",
             o.reference);
   line.option("--reference-traversal", "KIND", "That of the reference (as --traversal)",
               one_of(o.reference_traversal, {"path", "restart", "baseline"}));
-  line.text("--report", "OUT.json", "Write what every frame cost", o.report);
+  line.file("--report", "OUT.json", "Write what every frame cost", o.report);
   line.flag("--no-images", "Render and report only", o.no_images);
   declare_input_options(line, o.scene.open);
 }

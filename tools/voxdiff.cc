@@ -44,7 +44,7 @@ void declare(CommandLine& line, Options& o) {
                                    : bad_usage("\"" + text + "\": expected a number greater than 0");
               });
   line.flag("--histogram", "Print how the absolute errors are distributed (--json always does)", o.histogram);
-  line.text("-o,--output", "ERR", "Write the absolute errors as a volume or an image", o.errors);
+  line.file("-o,--output", "ERR", "Write the absolute errors as a volume or an image", o.errors);
   declare_input_options(line, o.open);
 }
 

@@ -29,7 +29,7 @@ struct Options {
 void declare(CommandLine& line, Options& o) {
   line.argument("INPUT", "Volume file, folder or pattern of images, built-in such as sphere:64, or -",
                 o.input);
-  line.text("-o,--output", "OUT", "Output (.vqv), or -", o.output, true);
+  line.file("-o,--output", "OUT", "Output (.vqv), or -", o.output, true);
   line.flag("--lossless", "Every voxel as it is; floats are refused (default, but floats get 65536 levels)",
             o.lossless);
   line.option("--max-error", "E", "No voxel is further than this from the original, in sample values",

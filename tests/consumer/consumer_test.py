@@ -69,6 +69,15 @@ def check_programs(prefix, library, folder):
     check("svmm-encode" in plan, f"vox-sweep plans no encoding: {plan}")
 
 
+def check_manual(prefix):
+    """Every program has its page and its completions."""
+    share = files_below(os.path.join(prefix, "share"))
+    for program in files_below(os.path.join(prefix, "bin")):
+        for path in (f"man/man1/{program}.1", f"bash-completion/completions/{program}", f"zsh/site-functions/_{program}",
+                     f"fish/vendor_completions.d/{program}.fish"):
+            check(path in share, f"there is no share/{path}")
+
+
 def check_consumer(arguments, prefix, folder):
     """A project that knows nothing but where Voxkit is installed."""
     build = os.path.join(folder, "consumer")
@@ -101,6 +110,7 @@ def main():
         check_headers(os.path.join(prefix, "include", "voxkit"))
         check_modules(arguments.build, library)
         check_programs(prefix, library, folder)
+        check_manual(prefix)
         check_consumer(arguments, prefix, folder)
     print("ok")
 

@@ -5,10 +5,15 @@
 #include <CLI/CLI.hpp>
 #include <algorithm>
 #include <cstdlib>
+#include <map>
 #include <numeric>
+#include <set>
+#include <sstream>
+#include <string_view>
 #include <vector>
 
 #include "formats/parallel.h"
+#include "tools/common/json.h"
 
 namespace voxkit::cli {
 namespace {
@@ -26,6 +31,33 @@ size_t edit_distance(const std::string& a, const std::string& b) {
     }
   }
   return row.back();
+}
+
+struct ExitCode {
+  int code;
+  const char* meaning;
+};
+constexpr ExitCode exit_codes[] = {{0, "done"},
+                                   {1, "the check answered no"},
+                                   {2, "usage"},
+                                   {3, "input unreadable"},
+                                   {4, "output cannot be written, or exists"},
+                                   {5, "a limit was reached"},
+                                   {6, "the device asked for is not there"},
+                                   {70, "a bug of ours"}};
+
+/// All in a sentence, in lines of at most 98 characters.
+std::string exit_codes_text() {
+  std::string text = "Exit codes:";
+  for (const auto& [code, meaning] : exit_codes)
+    text += fmt::format("{} {} {}", code == 0 ? "" : ";", code, meaning);
+  text += '.';
+  for (size_t line = 0; line + 98 < text.size();) {
+    const size_t end = text.rfind(' ', line + 98);
+    text[end] = '\n';
+    line = end + 1;
+  }
+  return text;
 }
 
 std::string nearest_option(const CLI::App& app, const std::string& name) {
@@ -49,38 +81,40 @@ std::string nearest_option(const CLI::App& app, const std::string& name) {
 }  // namespace
 
 struct CommandLine::State {
-  State(const std::string& tool, const std::string& purpose) : app(purpose, tool) {}
+  State(const std::string& tool, const std::string& purpose, const std::string& example_lines)
+      : app(purpose, tool), examples(example_lines) {}
   CLI::App app;
   CommonOptions options;
+  std::string examples;
+  std::map<std::string, std::vector<std::string>> words;  ///< that options may have as values, by their names
+  std::set<std::string> files;                            ///< options whose values name files
 };
 
 CommandLine::CommandLine(const std::string& tool, const std::string& purpose, const std::string& examples)
-    : state_(std::make_unique<State>(tool, purpose)) {
+    : state_(std::make_unique<State>(tool, purpose, examples)) {
   CLI::App& app = state_->app;
   app.set_help_flag("-h,--help", "Show this help");
   app.set_version_flag("-V,--version", tool + " " + version_text(), "Show the version");
   app.get_formatter()->column_width(34);
-  app.footer(
-      "Examples:\n" + examples +
-      "\nExit codes: 0 done; 1 the check answered no; 2 usage; 3 input unreadable; 4 output cannot be\n"
-      "written, or exists; 5 a limit was reached; 6 the device asked for is not there; 70 a bug of ours.");
+  app.footer("Examples:\n" + examples + "\n" + exit_codes_text());
 }
 
 CommandLine::~CommandLine() = default;
 
 void CommandLine::option(const std::string& names, const std::string& metavar, const std::string& help,
-                         Parser parse, bool required) {
+                         Parser parser, bool required) {
   const std::string shown = names.substr(names.rfind(',') == names.npos ? 0 : names.rfind(',') + 1);
   state_->app
       .add_option_function<std::string>(
           names,
-          [parse = std::move(parse), shown](const std::string& value) {
-            if (const Status status = parse(value); !status)
+          [read = std::move(parser.read), shown](const std::string& value) {
+            if (const Status status = read(value); !status)
               throw CLI::ValidationError(shown, status.error().what);
           },
           help)
       ->type_name(metavar)
       ->required(required);
+  state_->words[shown] = std::move(parser.words);
 }
 
 void CommandLine::text(const std::string& names, const std::string& metavar, const std::string& help,
@@ -90,6 +124,12 @@ void CommandLine::text(const std::string& names, const std::string& metavar, con
     return {};
   };
   option(names, metavar, help, store, required);
+}
+
+void CommandLine::file(const std::string& names, const std::string& metavar, const std::string& help,
+                       std::string& value, bool required) {
+  text(names, metavar, help, value, required);
+  state_->files.insert(names.substr(names.rfind(',') + 1));
 }
 
 void CommandLine::flag(const std::string& names, const std::string& help, bool& value) {
@@ -117,14 +157,11 @@ void CommandLine::declare_common() {
   flag(free_names("-f", "--force"), "Overwrite an existing output", options.force);
   flag("--json", "Print the result as one JSON object", options.json);
   option("--progress", "auto|plain|never", "Progress on standard error; plain: key=value lines",
-         [&options](const std::string& text) -> Status {
-           std::string word;
-           VOX_CHECK(one_of(word, {"auto", "plain", "never"})(text));
+         one_of({"auto", "plain", "never"}, [&options](const std::string& word) {
            options.progress = word == "auto"    ? ProgressMode::automatic
                               : word == "plain" ? ProgressMode::plain
                                                 : ProgressMode::never;
-           return {};
-         });
+         }));
   option("--max-memory", "SIZE", "Refuse to use more memory for voxels, such as 512M or 3G",
          [&options](const std::string& text) -> Status {
            VOX_TRY(options.max_memory, read_size(text));
@@ -132,9 +169,45 @@ void CommandLine::declare_common() {
          });
 }
 
+std::string CommandLine::description() const {
+  const CLI::App& app = state_->app;
+  Json arguments = Json::array(), options = Json::array(), examples = Json::array(), codes = Json::array();
+  for (const CLI::Option* option : app.get_options()) {
+    Json entry = Json::object();
+    if (option->get_positional()) {
+      arguments.push(
+          std::move(entry.set("name", option->get_name(true)).set("help", option->get_description())));
+      continue;
+    }
+    Json names = Json::array(), excludes = Json::array(), words = Json::array();
+    for (const std::string& name : option->get_snames()) names.push("-" + name);
+    for (const std::string& name : option->get_lnames()) names.push("--" + name);
+    for (const CLI::Option* other : option->get_excludes()) excludes.push(other->get_name());
+    const std::string name = option->get_name();
+    const bool takes_value = option->get_items_expected_max() > 0;
+    if (const auto known = state_->words.find(name); known != state_->words.end())
+      for (const std::string& word : known->second) words.push(word);
+    entry.set("names", std::move(names)).set("value", takes_value ? option->get_type_name() : "");
+    entry.set("help", option->get_description()).set("required", option->get_required());
+    entry.set("kind", state_->files.contains(name) ? "file" : "").set("words", std::move(words));
+    entry.set("excludes", std::move(excludes));
+    options.push(std::move(entry));
+  }
+  std::istringstream lines(state_->examples);
+  for (std::string line; std::getline(lines >> std::ws, line);) examples.push(line);
+  for (const auto& [code, meaning] : exit_codes)
+    codes.push(std::move(Json::object().set("code", code).set("meaning", meaning)));
+  Json json = Json::result();
+  json.set("tool", app.get_name()).set("purpose", app.get_description());
+  json.set("arguments", std::move(arguments)).set("options", std::move(options));
+  json.set("examples", std::move(examples)).set("exit_codes", std::move(codes));
+  return json.text();
+}
+
 Result<CommandLine::Outcome> CommandLine::parse(int argc, char** argv) {
   CLI::App& app = state_->app;
   declare_common();
+  if (argc == 2 && std::string_view(argv[1]) == "--describe") return Outcome{description(), {}};
   try {
     app.parse(argc, argv);
   } catch (const CLI::CallForHelp&) {

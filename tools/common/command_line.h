@@ -36,11 +36,16 @@ class CommandLine {
               bool required = false);
   void text(const std::string& names, const std::string& metavar, const std::string& help, std::string& value,
             bool required = false);
+  /// A text that names a file.
+  void file(const std::string& names, const std::string& metavar, const std::string& help, std::string& value,
+            bool required = false);
   void flag(const std::string& names, const std::string& help, bool& value);
-  /// An argument without a name, which must be given; in the order of the calls.
+  /// An argument without a name, which must be given and names a file; in the order of the calls.
   void argument(const std::string& metavar, const std::string& help, std::string& value);
 
-  /// What to do after the arguments have been read: the work, or print a text (help, version) and stop.
+  /// What to do after the arguments have been read: the work, or print a text and stop: help, version, or, of
+  /// `--describe` alone, all of this as JSON, from which manual pages and completions are made
+  /// (packaging/README.md).
   struct Outcome {
     std::optional<std::string> print;
     CommonOptions options;
@@ -50,6 +55,7 @@ class CommandLine {
 
  private:
   void declare_common();
+  std::string description() const;
 
   struct State;
   std::unique_ptr<State> state_;

@@ -75,19 +75,12 @@ void declare_input_options(CommandLine& line, OpenOptions& options, bool type) {
   line.option("--dims", "X,Y,Z", "Extent of a .raw input", dims(options.dims));
   if (type) {
     line.option("--type", "TYPE", "Type of a .raw input: u8 i8 u16 i16 u32 i32 f32 f64 rgb8 rgba8 bit",
-                [&options](const std::string& text) -> Status {
-                  options.type.emplace();
-                  return one_of(*options.type, {"u8", "i8", "u16", "i16", "u32", "i32", "f32", "f64", "rgb8",
-                                                "rgba8", "bit"})(text);
-                });
+                one_of({"u8", "i8", "u16", "i16", "u32", "i32", "f32", "f64", "rgb8", "rgba8", "bit"},
+                       [&options](const std::string& word) { options.type = word; }));
   }
-  line.option("--endian", "big|little", "Byte order of a .raw input",
-              [&options](const std::string& text) -> Status {
-                std::string word;
-                VOX_CHECK(one_of(word, {"big", "little"})(text));
-                options.big_endian = word == "big";
-                return {};
-              });
+  line.option(
+      "--endian", "big|little", "Byte order of a .raw input",
+      one_of({"big", "little"}, [&options](const std::string& word) { options.big_endian = word == "big"; }));
   line.text("--grid", "NAME", "Grid of a .vdb input", options.grid);
 }
 

@@ -55,6 +55,10 @@ Json& Json::push(Json value) {
   value_->json.push_back(std::move(value.value_->json));
   return *this;
 }
+Json& Json::push(std::string_view value) {
+  value_->json.push_back(value);
+  return *this;
+}
 Json& Json::push(double value) {
   value_->json.push_back(real(value));
   return *this;

@@ -42,6 +42,7 @@ class Json {
   Json& set(const std::string& key, Index3 value);
   Json& set(const std::string& key, Json value);
   Json& push(Json value);
+  Json& push(std::string_view value);
   Json& push(double value);
   Json& push(int64_t value);
 

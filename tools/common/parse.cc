@@ -110,19 +110,23 @@ Result<uint64_t> read_size(std::string_view text) {
   return value << shift;
 }
 
-Parser one_of(std::string& value, std::initializer_list<const char*> words) {
-  return [&value,
-          words = std::vector<std::string>(words.begin(), words.end())](const std::string& text) -> Status {
+Parser one_of(std::string& value, std::vector<std::string> words) {
+  return one_of(std::move(words), [&value](const std::string& word) { value = word; });
+}
+
+Parser one_of(std::vector<std::string> words, std::function<void(const std::string&)> store) {
+  const auto read = [words, store = std::move(store)](const std::string& text) -> Status {
     std::string expected;
     for (const std::string& word : words) {
       if (word == text) {
-        value = text;
+        store(word);
         return {};
       }
       expected += (expected.empty() ? "" : &word == &words.back() ? " or " : ", ") + word;
     }
     return bad_usage(fmt::format("\"{}\": expected {}", text, expected));
   };
+  return Parser(read, words);
 }
 
 }  // namespace voxkit::cli

@@ -4,10 +4,10 @@
 
 #include <cstdint>
 #include <functional>
-#include <initializer_list>
 #include <string>
 #include <string_view>
 #include <type_traits>
+#include <utility>
 #include <vector>
 
 #include "formats/convert.h"
@@ -16,7 +16,16 @@
 
 namespace voxkit::cli {
 
-using Parser = std::function<Status(const std::string&)>;
+/// Reads and stores the value of an option; an error says what was expected.
+struct Parser {
+  template <class Read>
+  requires std::is_invocable_r_v<Status, Read&, const std::string&> Parser(
+      Read reader, std::vector<std::string> known = {})  // NOLINT: lambdas are parsers
+      : read(std::move(reader)), words(std::move(known)) {}
+
+  std::function<Status(const std::string&)> read;
+  std::vector<std::string> words;  ///< all values that there are, where these are words; else none
+};
 
 /// The readers themselves; errors are ErrorCode::usage and say what was expected.
 Result<int64_t> read_integer(std::string_view text, int64_t least, int64_t greatest);
@@ -64,12 +73,15 @@ Parser box(T& value) {
 }
 template <class T>
 Parser target_type(T& value) {
-  return [&value](const std::string& text) -> Status {
+  const auto read = [&value](const std::string& text) -> Status {
     VOX_TRY(value, parse_target_type(text));
     return {};
   };
+  return Parser(read, target_type_names());
 }
 /// One of a few words.
-Parser one_of(std::string& value, std::initializer_list<const char*> words);
+Parser one_of(std::string& value, std::vector<std::string> words);
+/// The same; `store` is called with it.
+Parser one_of(std::vector<std::string> words, std::function<void(const std::string&)> store);
 
 }  // namespace voxkit::cli

@@ -1,7 +1,9 @@
 """The options of vox-sweep: those that every program of ours has, and its own; messages as the others word them."""
 import dataclasses
+import json
 import os
 import re
+import textwrap
 
 from sweep.failure import Failure, USAGE, nearest
 from sweep.build import TOOL
@@ -12,8 +14,9 @@ EXAMPLES = """  vox-sweep sweep.json -o sweep
   vox-sweep sweep.json -o sweep --dry-run
   vox-sweep sweep.json -o sweep --snakemake
 """
-EXIT_CODES = """Exit codes: 0 done; 1 the check answered no: a setting failed, or none is as --best asks; 2 usage;
-3 input unreadable; 4 output cannot be written; 5 a limit was reached; 70 a bug of ours."""
+EXIT_CODES = {0: "done", 1: "the check answered no: a setting failed, or none is as --best asks", 2: "usage",
+              3: "input unreadable", 4: "output cannot be written", 5: "a limit was reached", 70: "a bug of ours"}
+SPEC_HELP = "What to run: a .json or .yaml file, as tools/sweep/README.md describes it, or - for JSON on standard input"
 
 
 @dataclasses.dataclass
@@ -24,6 +27,17 @@ class Option:
     help: str
     read: object = None  # of a value: text to value, or a Failure that does not name the option
     several: bool = False
+    kind: str = ""  # what the value names: "folder"
+
+    def names(self):
+        return ([f"-{self.short}"] if self.short else []) + [f"--{self.long}"]
+
+    def required(self):
+        return self.long == "output"
+
+    def excludes(self):
+        """What --help says of it."""
+        return ["--" + (b if a == self.long else a) for a, b in EXCLUDES[:1] if self.long in (a, b)]
 
 
 @dataclasses.dataclass
@@ -68,13 +82,15 @@ def one_of(*words):
             raise Failure(USAGE, f'"{text}": expected {", ".join(words[:-1])} or {words[-1]}')
         return text
 
+    read.words = words
     return read
 
 
 OPTIONS = [
     Option("h", "help", "", "Show this help"),
     Option("V", "version", "", "Show the version"),
-    Option("o", "output", "DIR", "Folder of the results; what is there already is not run again", str),
+    Option("o", "output", "DIR", "Folder of the results; what is there already is not run again", str,
+           kind="folder"),
     Option("", "dry-run", "", "Print what would be run, and how much of it is done"),
     Option("", "best", "CONDITIONS", "Print the smallest setting of each input that fulfils all of them, such as "
            '"psnr>=45,decode_seconds<2"; exit 1 if there is none', str, several=True),
@@ -98,18 +114,27 @@ EXCLUDES = [("quiet", "verbose"), ("dry-run", "snakemake"), ("dry-run", "collect
 
 def help_text():
     lines = [PURPOSE, f"Usage: {TOOL} [OPTIONS] SPEC", "", "Positionals:",
-             "  SPEC REQUIRED                   What to run: a .json or .yaml file, as tools/sweep/README.md describes it,",
-             "                                  or - for JSON on standard input", "", "Options:"]
+             textwrap.fill(f"{'  SPEC REQUIRED':<33} {SPEC_HELP}", 110, subsequent_indent=" " * 34, replace_whitespace=False), "", "Options:"]
     for option in OPTIONS:
-        names = "  " + (f"-{option.short}," if option.short else "") + f"--{option.long}"
+        names = "  " + ",".join(option.names())
         if option.metavar:
             names += f" {option.metavar}" + (" ..." if option.several else "")
-        if option.long == "output":
+        if option.required():
             names += " REQUIRED"
-        excluded = [b if a == option.long else a for a, b in EXCLUDES[:1] if option.long in (a, b)]
-        names += "".join(f" Excludes: --{name}" for name in excluded)
+        names += "".join(f" Excludes: {name}" for name in option.excludes())
         lines.append(f"{names:<33} {option.help}")
-    return "\n".join(lines) + f"\n\nExamples:\n{EXAMPLES}\n{EXIT_CODES}\n"
+    codes = "; ".join(f"{code} {meaning}" for code, meaning in EXIT_CODES.items())
+    return "\n".join(lines) + f"\n\nExamples:\n{EXAMPLES}\n" + textwrap.fill(f"Exit codes: {codes}.", 98) + "\n"
+
+
+def description():
+    """What --describe prints, as that of the other programs: what manual pages and completions are made from."""
+    options = [{"names": option.names(), "value": option.metavar + (" ..." if option.several else ""), "help": option.help,
+                "required": option.required(), "kind": option.kind, "words": list(getattr(option.read, "words", ())),
+                "excludes": option.excludes()} for option in OPTIONS]
+    return json.dumps({"schema": 1, "tool": TOOL, "purpose": PURPOSE, "arguments": [{"name": "SPEC", "help": SPEC_HELP}],
+                       "options": options, "examples": [line.strip() for line in EXAMPLES.splitlines()],
+                       "exit_codes": [{"code": code, "meaning": meaning} for code, meaning in EXIT_CODES.items()]}, indent=2) + "\n"
 
 
 def looks_like_option(word):
@@ -198,11 +223,13 @@ class Reader:
 
 
 def option_names():
-    return [name for option in OPTIONS for name in ([f"--{option.long}"] + ([f"-{option.short}"] if option.short else []))]
+    return [name for option in OPTIONS for name in reversed(option.names())]
 
 
 def parse(words, version):
     """(Options, None), or (None, a text to print)."""
+    if words == ["--describe"]:
+        return None, description()
     reader = Reader(words)
     reader.read()
     if reader.shown == "help":
