@@ -2,6 +2,9 @@
 #include "libcolor/voxelise.h"
 
 #include <algorithm>
+#include <cinttypes>
+#include <cstdio>
+#include <cstdlib>
 #include <glm/common.hpp>
 #include <glm/geometric.hpp>
 #include <numbers>
@@ -124,14 +127,20 @@ class VoxeliseTest : public MeshTest {
 };
 
 TEST_F(VoxeliseTest, EveryVoxelAndNoOther) {
-  for (const int64_t resolution : {1, 2, 7, 16, 64, 128})
+  std::vector<std::pair<int64_t, int>> sizes{{1, 40}, {2, 40}, {7, 40}, {16, 40}, {64, 40}, {128, 40}};
+  // VOXKIT_BRUTE_FORCE=1024@2, say, asks of each voxel around two triangles: minutes.
+  if (const char* more = std::getenv("VOXKIT_BRUTE_FORCE")) {
+    sizes = {{}};
+    ASSERT_EQ(std::sscanf(more, "%" SCNd64 "@%d", &sizes[0].first, &sizes[0].second), 2);
+  }
+  for (const auto& [resolution, triangles] : sizes)
     for (const SurfaceKind kind : {SurfaceKind::thin, SurfaceKind::conservative}) {
       const auto seed = static_cast<unsigned>(random_());
       random_.seed(seed);
-      const auto want = reference(random_mesh(40), resolution, kind);
+      const auto want = reference(random_mesh(triangles), resolution, kind);
       random_.seed(seed);
       std::vector<uint64_t> have;
-      for (const SurfaceVoxel& voxel : voxelise(random_mesh(40), {resolution, kind}))
+      for (const SurfaceVoxel& voxel : voxelise(random_mesh(triangles), {resolution, kind}))
         have.push_back(voxel.place);
       EXPECT_EQ(have, want) << resolution;
     }
