@@ -52,31 +52,51 @@ Result<std::shared_ptr<const MappedFile>> MappedFile::open(const std::string& pa
 }
 
 Result<std::shared_ptr<const MappedFile>> MappedFile::spool(InputStream& stream) {
-  const char* folder = std::getenv("TMPDIR");
-  std::string path = fmt::format("{}/voxkit-XXXXXX", folder && *folder ? folder : "/tmp");
-  Descriptor file{::mkostemp(path.data(), O_CLOEXEC)};
-  if (file.fd < 0)
-    return fail(ErrorCode::output, path,
-                fmt::format("cannot create a temporary file: {}", std::strerror(errno)));
-  ::unlink(path.c_str());
+  TemporaryFile file(stream.name());
   std::vector<std::byte> buffer(size_t{1} << 20);
   for (;;) {
     VOX_CHECK(check_interrupt());
     VOX_TRY(const size_t count, stream.read(buffer));
-    if (count == 0) break;
-    for (size_t done = 0; done < count;) {
-      const ssize_t n = ::write(file.fd, buffer.data() + done, count - done);
-      if (n < 0 && errno == EINTR) continue;
-      if (n < 0)
-        return fail(ErrorCode::output, folder ? folder : "/tmp",
-                    fmt::format("cannot spool {}: {}", stream.name(), std::strerror(errno)));
-      done += static_cast<size_t>(n);
-    }
+    if (count == 0) return file.map();
+    VOX_CHECK(file.write(std::span(buffer).first(count)));
   }
-  VOX_TRY(auto bytes, map(file.fd, stream.name()));
+}
+
+TemporaryFile::~TemporaryFile() {
+  if (fd_ >= 0) ::close(fd_);
+}
+
+Status TemporaryFile::create() {
+  const char* const folder = std::getenv("TMPDIR");
+  folder_ = folder && *folder ? folder : "/tmp";
+  std::string path = folder_ + "/voxkit-XXXXXX";
+  fd_ = ::mkostemp(path.data(), O_CLOEXEC);
+  if (fd_ < 0)
+    return fail(ErrorCode::output, path,
+                fmt::format("cannot create a temporary file: {}", std::strerror(errno)));
+  ::unlink(path.c_str());
+  return {};
+}
+
+Status TemporaryFile::write(std::span<const std::byte> bytes) {
+  if (fd_ < 0) VOX_CHECK(create());
+  while (!bytes.empty()) {
+    const ssize_t n = ::write(fd_, bytes.data(), bytes.size());
+    if (n < 0 && errno == EINTR) continue;
+    if (n < 0)
+      return fail(ErrorCode::output, folder_,
+                  fmt::format("cannot spool {}: {}", name_, std::strerror(errno)));
+    bytes = bytes.subspan(static_cast<size_t>(n));
+  }
+  return {};
+}
+
+Result<std::shared_ptr<const MappedFile>> TemporaryFile::map() {
+  if (fd_ < 0) VOX_CHECK(create());
+  VOX_TRY(auto bytes, voxkit::map(fd_, name_));
   std::shared_ptr<MappedFile> mapped(new MappedFile);
   mapped->bytes_ = bytes;
-  mapped->name_ = stream.name();
+  mapped->name_ = name_;
   return mapped;
 }
 

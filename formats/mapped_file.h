@@ -5,6 +5,7 @@
 #include <memory>
 #include <span>
 #include <string>
+#include <utility>
 
 #include "formats/input_stream.h"
 
@@ -24,9 +25,30 @@ class MappedFile {
   const std::string& name() const { return name_; }
 
  private:
+  friend class TemporaryFile;
   MappedFile() = default;
   std::span<const std::byte> bytes_;
   std::string name_;
+};
+
+/// Bytes that go through an unlinked file in $TMPDIR (default /tmp).
+class TemporaryFile {
+ public:
+  /// `name`: of what goes through, for messages.
+  explicit TemporaryFile(std::string name) : name_(std::move(name)) {}
+  ~TemporaryFile();
+  TemporaryFile(const TemporaryFile&) = delete;
+  TemporaryFile& operator=(const TemporaryFile&) = delete;
+
+  /// Appends. ErrorCode::output where there is no room.
+  Status write(std::span<const std::byte> bytes);
+  /// All that was written.
+  Result<std::shared_ptr<const MappedFile>> map();
+
+ private:
+  Status create();
+  std::string name_, folder_;
+  int fd_ = -1;
 };
 
 /// The bytes of a mapped file front to back; any number of streams can read one file.

@@ -87,9 +87,9 @@ Status check_mesh(Mesh& mesh, const std::string& path) {
     bring_into_range(material.color);
     material.alpha_cutoff = within_one(material.alpha_cutoff);
   }
-  if (kept == 0 && had_triangles) return bad_input(path, "a mesh without triangles that have an area");
-  if (!had_triangles && (vertices == 0 || !has_ending(path, ".ply")))
-    return bad_input(path, "a mesh without triangles");
+  if (kept == 0)
+    return bad_input(
+        path, had_triangles ? "a mesh without triangles that have an area" : "a mesh without triangles");
   return {};
 }
 

@@ -59,7 +59,7 @@ bool is_mesh_name(const std::string& name);
 /// taken as sRGB, those of glTF as linear light, as their specifications or usual writers have it. Materials
 /// of .obj whose texture or opacity map has alpha are masks with a cut-off of 0.5.
 ///
-/// A .ply file without faces gives its vertices, as points, and no triangles.
+/// A .ply file without faces is no mesh but points (point_cloud.h): ErrorCode::input.
 ///
 /// A texture, a material library or a buffer that the mesh names and that is not there is an error, since the
 /// colours would be wrong in silence. Errors: ErrorCode::input, ErrorCode::limit.

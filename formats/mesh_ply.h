@@ -11,7 +11,7 @@ namespace voxkit {
 /// Vertices have x, y, z; red, green, blue and alpha; s and t, u and v or texture_u and texture_v, which
 /// count from the bottom. Faces have vertex_indices or vertex_index, and, as MeshLab writes them, a list
 /// texcoord of two numbers a corner; a `comment TextureFile` names the texture. Polygons become fans of
-/// triangles; a file without faces gives points. Other elements and properties are passed over. Errors:
+/// triangles. Other elements and properties are passed over. Errors:
 /// ErrorCode::input, ErrorCode::limit.
 Result<MeshParts> read_ply(const std::string& path, Context& ctx);
 

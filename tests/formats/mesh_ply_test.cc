@@ -92,17 +92,6 @@ TEST_F(MeshPlyTest, TexturesOfMeshLab) {
   EXPECT_EQ(mesh->uvs[mesh->triangles[0].vertices[0]], glm::vec2(0, 1));
 }
 
-TEST_F(MeshPlyTest, PointsWithoutFaces) {
-  const Mesh mesh = read(
-      "ply\nformat ascii 1.0\nelement vertex 2\nproperty float x\nproperty float y\nproperty float z\n"
-      "property uchar red\nproperty uchar green\nproperty uchar blue\nend_header\n1 2 3 255 0 0\n4 5 6 0 255 "
-      "0\n");
-  EXPECT_TRUE(mesh.triangles.empty());
-  ASSERT_EQ(mesh.positions.size(), 2u);
-  EXPECT_EQ(mesh.positions[1], glm::dvec3(4, 5, 6));
-  EXPECT_EQ(mesh.colors[1], glm::vec4(0, 1, 0, 1));
-}
-
 TEST_F(MeshPlyTest, Refusals) {
   const auto file = [](const std::string& vertex, const std::string& face, const std::string& data) {
     return "ply\nformat ascii 1.0\nelement vertex " + vertex +
@@ -111,6 +100,7 @@ TEST_F(MeshPlyTest, Refusals) {
   const std::string faces = "element face 1\nproperty list uchar int vertex_indices\n";
   const std::string points = "0 0 0\n1 0 0\n0 1 0\n";
   expect_error(file("0", "", ""), "without triangles");
+  expect_error(file("3", "", points), "without triangles");
   expect_error(file("3", faces, points + "3 0 1 3\n"), "vertex 3: expected one below 3");
   expect_error(file("3", faces, points + "3 0 1 -1\n"), "expected one below 3");
   expect_error(file("3", faces, points + "3 0 1 1\n"), "without triangles");

@@ -14,6 +14,7 @@
 #include <vector>
 
 #include "formats/mesh.h"
+#include "formats/point_cloud.h"
 #include "tests/fuzz/seeds.h"
 
 namespace voxkit::fuzz {
@@ -138,9 +139,7 @@ Verdict read_mesh_file(const std::string& path) {
   if (const auto mesh = read_mesh(path, ctx); !mesh) {
     verdict = judge(mesh.error());
   } else {
-    // A .ply file may have points only.
-    if (mesh->triangles.empty() && (!path.ends_with(".ply") || mesh->positions.empty()))
-      return fault("a mesh of nothing");
+    if (mesh->triangles.empty()) return fault("a mesh of nothing");
     for (const MeshTriangle& triangle : mesh->triangles)
       for (const uint32_t v : triangle.vertices)
         if (v >= mesh->positions.size() || !std::isfinite(mesh->positions[v].x + mesh->positions[v].z))
@@ -258,8 +257,19 @@ Verdict read_dicom(Input input) {
       [&](Context& ctx) { return open_dicom(std::filesystem::path(path).parent_path().string(), ctx); });
 }
 
+/// A mesh, or points.
 Verdict read_mesh_ply(Input input) {
-  return read_mesh_file(put(input, "in.ply"));
+  const std::string path = put(input, "in.ply");
+  const auto points = open_ply_points(path);
+  if (!points) return judge(points.error());
+  if (!*points) return read_mesh_file(path);
+  uint64_t found = 0;
+  const Status status = (*points)->read([&](std::span<const CloudPoint> run) -> Status {
+    for (const CloudPoint& point : run) found += std::isfinite(point.at.x + point.at.y + point.at.z);
+    return {};
+  });
+  if (!status) return judge(status.error());
+  return found == (*points)->size() ? Verdict{true, {}} : fault("points that are not there");
 }
 
 Verdict read_mesh_gltf(Input input) {

@@ -1,6 +1,9 @@
 #include "tools/common/surface_input.h"
 
+#include "formats/mesh.h"
+#include "formats/point_cloud.h"
 #include "formats/readers.h"
+#include "libcolor/point_surface.h"
 #include "libcolor/terrain.h"
 #include "libcolor/volume_surface.h"
 #include "libcolor/voxel_list.h"
@@ -11,20 +14,21 @@ namespace {
 
 using Surface = Result<std::unique_ptr<color::SurfaceSource>>;
 
-/// What is read from a file, as voxels.
-Surface surface_of_mesh(Mesh mesh, const SurfaceOptions& options, Context& ctx) {
+/// What has no voxels before it is put into a grid.
+Surface voxelise(const std::string& name, const SurfaceOptions& options, Context& ctx) {
   color::VoxeliseOptions voxelise;
   voxelise.kind = options.kind;
   if (options.resolution) voxelise.resolution = *options.resolution;
-  if (mesh.triangles.empty()) return color::surface_of_points(std::move(mesh), voxelise.resolution, ctx);
+  if (has_ending(name, ".ply")) {
+    VOX_TRY(auto points, open_ply_points(name));
+    if (points) return color::surface_of_points(std::move(points), voxelise.resolution, ctx);
+  }
+  VOX_TRY(Mesh mesh, read_mesh(name, ctx));
   return color::make_surface(std::move(mesh), voxelise, ctx);
 }
 
 Surface open_any(const std::string& name, const SurfaceOptions& options, Context& ctx) {
-  if (is_mesh_name(name)) {
-    VOX_TRY(Mesh mesh, read_mesh(name, ctx));
-    return surface_of_mesh(std::move(mesh), options, ctx);
-  }
+  if (is_mesh_name(name)) return voxelise(name, options, ctx);
   if (options.resolution)
     return fail(ErrorCode::usage, name, "--resolution: has voxels already: expected a mesh");
   if (color::is_terrain(name)) return color::open_terrain(name);
