@@ -1,8 +1,6 @@
 #include "formats/dense_source.h"
 
 #include <fmt/format.h>
-#include <sys/mman.h>
-#include <unistd.h>
 
 #include <algorithm>
 #include <bit>
@@ -128,21 +126,16 @@ class MappedSource final : public VolumeSource {
     }
     return {};
   }
-  void expect(int64_t z0, int64_t z1) const override { advise(z0, z1, MADV_WILLNEED); }
-  /// Taken out of this process, not out of the page cache, so that reading again is cheap.
-  void release(int64_t z0, int64_t z1) const override { advise(z0, z1, MADV_DONTNEED); }
+  void expect(int64_t z0, int64_t z1) const override { expect_bytes(slices(z0, z1)); }
+  void release(int64_t z0, int64_t z1) const override { release_bytes(slices(z0, z1)); }
 
  private:
   /// Slices are one stretch of the file.
-  void advise(int64_t z0, int64_t z1, int advice) const {
+  std::span<const std::byte> slices(int64_t z0, int64_t z1) const {
     const uint64_t slice = static_cast<uint64_t>(info_.dims.x) * static_cast<uint64_t>(info_.dims.y);
     const uint64_t lo = layout_.file_bytes(slice * static_cast<uint64_t>(z0)).value_or(0);
     const uint64_t hi = layout_.file_bytes(slice * static_cast<uint64_t>(z1)).value_or(0);
-    const uintptr_t page = static_cast<uintptr_t>(::sysconf(_SC_PAGESIZE));
-    const uintptr_t first = (reinterpret_cast<uintptr_t>(samples_) + lo) / page * page;
-    const uintptr_t last = (reinterpret_cast<uintptr_t>(samples_) + hi) / page * page;
-    // Advice may be refused; nothing depends on it.
-    if (last > first) ::madvise(reinterpret_cast<void*>(first), last - first, advice);
+    return {samples_ + lo, std::max(lo, hi) - lo};
   }
 
   std::shared_ptr<const MappedFile> file_;

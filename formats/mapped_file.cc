@@ -100,6 +100,25 @@ Result<std::shared_ptr<const MappedFile>> TemporaryFile::map() {
   return mapped;
 }
 
+namespace {
+
+void advise(std::span<const std::byte> bytes, int advice) {
+  const auto page = static_cast<uintptr_t>(::sysconf(_SC_PAGESIZE));
+  const uintptr_t first = reinterpret_cast<uintptr_t>(bytes.data()) / page * page,
+                  last = reinterpret_cast<uintptr_t>(bytes.data() + bytes.size()) / page * page;
+  // Advice may be refused; nothing depends on it.
+  if (last > first) ::madvise(reinterpret_cast<void*>(first), last - first, advice);
+}
+
+}  // namespace
+
+void expect_bytes(std::span<const std::byte> bytes) {
+  advise(bytes, MADV_WILLNEED);
+}
+void release_bytes(std::span<const std::byte> bytes) {
+  advise(bytes, MADV_DONTNEED);
+}
+
 MappedFile::~MappedFile() {
   if (!bytes_.empty()) ::munmap(const_cast<std::byte*>(bytes_.data()), bytes_.size());
 }

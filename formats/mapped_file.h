@@ -31,6 +31,11 @@ class MappedFile {
   std::string name_;
 };
 
+/// Advice about bytes of a mapped file, as far as whole pages go: they will be wanted soon; or they may leave
+/// this process (not the page cache, so that reading them again is cheap).
+void expect_bytes(std::span<const std::byte> bytes);
+void release_bytes(std::span<const std::byte> bytes);
+
 /// Bytes that go through an unlinked file in $TMPDIR (default /tmp).
 class TemporaryFile {
  public:

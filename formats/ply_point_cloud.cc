@@ -60,7 +60,7 @@ class PlyPointCloud final : public PointCloud {
     const bool lists = std::any_of(element.properties.begin(), element.properties.end(),
                                    [](const Property& p) { return p.list; });
     if (header_.ascii || lists)
-      return in_runs(sink, [&](uint64_t, CloudPoint& point) -> Status {
+      return in_runs(sink, [&](uint64_t, CloudPoint& point) -> Result<size_t> {
         for (const Property& property : element.properties) {
           if (property.role == Role::none) {
             VOX_CHECK(numbers.pass(property));
@@ -69,33 +69,35 @@ class PlyPointCloud final : public PointCloud {
           VOX_TRY(const double value, numbers.next(property.type));
           fields.set(property, value, point);
         }
-        return {};
+        return numbers.at();
       });
     // All points take as many bytes, and these were counted.
     size_t stride = 0;
     for (const Property& property : element.properties) stride += bytes_of(property.type);
-    const std::byte* const first = bytes.data() + numbers.at();
-    return in_runs(sink, [&](uint64_t i, CloudPoint& point) -> Status {
-      const std::byte* at = first + i * stride;
+    const size_t first = numbers.at();
+    return in_runs(sink, [&](uint64_t i, CloudPoint& point) -> Result<size_t> {
+      const std::byte* at = bytes.data() + first + i * stride;
       for (const Property& property : element.properties) {
         if (property.role != Role::none)
           fields.set(property, load(at, property.type, header_.big_endian), point);
         at += bytes_of(property.type);
       }
-      return {};
+      return first + (i + 1) * stride;
     });
   }
 
  private:
+  /// `next(i, point)` reads a point and says which byte of the file it ends before.
   template <class Next>
   Status in_runs(const Sink& sink, const Next& next) const {
     constexpr uint64_t most = 1 << 14;
     const CloudPoint blank = PointFields(header_.elements[vertices_]).blank();
     std::vector<CloudPoint> run;
     run.reserve(most);
+    size_t released = 0, end = 0;
     for (uint64_t i = 0; i < size_; ++i) {
       CloudPoint& point = run.emplace_back(blank);
-      VOX_CHECK(next(i, point));
+      VOX_TRY(end, next(i, point));
       for (int a = 0; a < 3; ++a)
         if (constexpr double large = 3.5e38; !(std::abs(point.at[a]) <= large))
           return bad_input(file_->name(), fmt::format("a point at {}, {}, {}: expected finite coordinates",
@@ -104,6 +106,8 @@ class PlyPointCloud final : public PointCloud {
       VOX_CHECK(check_interrupt());
       VOX_CHECK(sink(run));
       run.clear();
+      release_bytes(file_->bytes().subspan(released, end - released));
+      released = end;
     }
     return {};
   }

@@ -76,27 +76,38 @@ class PartFile {
   Status merge(Means& means) {
     VOX_TRY(const auto file, writer_.map());
     const auto* at = reinterpret_cast<const SurfaceVoxel*>(file->bytes().data());
-    const auto later = [](const Part& a, const Part& b) { return a.front().place > b.front().place; };
-    std::priority_queue<Part, std::vector<Part>, decltype(later)> parts(later);
+    struct Rest {
+      Part part;
+      const SurfaceVoxel* released;  ///< what is before has left this process
+    };
+    const auto later = [](const Rest& a, const Rest& b) {
+      return a.part.front().place > b.part.front().place;
+    };
+    std::priority_queue<Rest, std::vector<Rest>, decltype(later)> rests(later);
     for (const uint64_t size : sizes_) {
-      parts.push({at, size});
+      rests.push({{at, size}, at});
       at += size;
     }
-    while (!parts.empty()) {
-      Part part = parts.top();
-      parts.pop();
+    while (!rests.empty()) {
+      auto [part, released] = rests.top();
+      rests.pop();
       // As long as it is that of the least places.
-      const uint64_t end = parts.empty() ? ~uint64_t{0} : parts.top().front().place;
+      const uint64_t end = rests.empty() ? ~uint64_t{0} : rests.top().part.front().place;
       do {
         VOX_CHECK(means.add(part.front()));
         part = part.subspan(1);
       } while (!part.empty() && part.front().place <= end);
-      if (!part.empty()) parts.push(part);
+      if (part.empty() || part.data() - released >= release_step) {
+        release_bytes(std::as_bytes(std::span(released, part.data())));
+        released = part.data();
+      }
+      if (!part.empty()) rests.push({part, released});
     }
     return {};
   }
 
  private:
+  static constexpr ptrdiff_t release_step = 1 << 16;
   TemporaryFile writer_{"points"};
   std::vector<uint64_t> sizes_;
 };
