@@ -1,7 +1,7 @@
 #!/usr/bin/env python3
 """Installs, moves what was installed, runs it there, and builds a project of its own against it.
 
-consumer_test.py --cmake CMAKE --build FOLDER --compiler CXX [--flags FLAGS]; 77: cannot be run, with the reason.
+consumer_test.py --cmake CMAKE --generator NAME --build FOLDER --compiler CXX [--flags FLAGS]; 77: cannot be run, with the reason.
 """
 import argparse
 import os
@@ -81,7 +81,7 @@ def check_manual(prefix):
 def check_consumer(arguments, prefix, folder):
     """A project that knows nothing but where Voxkit is installed."""
     build = os.path.join(folder, "consumer")
-    run(arguments.cmake, "-S", HERE, "-B", build, f"-DCMAKE_PREFIX_PATH={prefix}", f"-DCMAKE_CXX_COMPILER={arguments.compiler}",
+    run(arguments.cmake, "-G", arguments.generator, "-S", HERE, "-B", build, f"-DCMAKE_PREFIX_PATH={prefix}", f"-DCMAKE_CXX_COMPILER={arguments.compiler}",
         f"-DCMAKE_CXX_FLAGS={arguments.flags}", "-DCMAKE_BUILD_TYPE=Release")
     run(arguments.cmake, "--build", build)
     printed = run(os.path.join(build, "consumer"))
@@ -93,7 +93,7 @@ def check_consumer(arguments, prefix, folder):
 
 def main():
     parser = argparse.ArgumentParser()
-    for name in ("cmake", "build", "compiler"):
+    for name in ("cmake", "generator", "build", "compiler"):
         parser.add_argument(f"--{name}", required=True)
     parser.add_argument("--flags", default="")
     arguments = parser.parse_args()
