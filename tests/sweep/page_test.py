@@ -23,7 +23,8 @@ SPEC = {"title": HOSTILE, "inputs": ["menger:2", {"name": "a 'sphere' & more", "
                    {"tool": "vq-encode", "name": "vq", "inputs": ["a 'sphere' & more"], "options": {"reduce": [2, 8]}}],
         "renders": [{"name": "view", "options": {"size": "200x150"}}],
         "plots": [{"name": "levels", "title": "Levels and size", "x": "levels", "y": "percent", "log": "y"},
-                  {"name": "joined", "title": "Joined", "x": "quality", "y": "psnr", "line": "all", "baseline": "view.ms_avg"}]}
+                  {"name": "joined", "title": "Joined", "x": "quality", "y": "psnr", "line": "all", "baseline": "view.ms_avg"},
+                  {"name": "one-codec", "title": "One codec", "x": "percent", "y": "rmse", "codecs": ["vq"]}]}
 WIDTHS = {390: 844, 1280: 900}
 
 
@@ -115,7 +116,7 @@ class PageTest(unittest.TestCase):
         self.assertEqual(self.find("h1")[0].text, HOSTILE)
         self.assertEqual(self.driver.title, HOSTILE)
         self.assertEqual(self.script("return performance.getEntriesByType('resource').filter(e => !e.name.startsWith('data:')).length"), 0)
-        self.assertEqual(len(self.find("canvas")), 4)
+        self.assertEqual(len(self.find("canvas")), 5)
         self.assertIn(f"{sum(row['status'] == 'failed' for row in self.table)} failed", self.find("#summary")[0].text)
         for canvas in self.find("canvas"):
             box = canvas.rect
@@ -227,6 +228,11 @@ class PageTest(unittest.TestCase):
         self.assertEqual(across, [50, 85, 100])
         times = sorted(float(row["view.ms_avg"]) for row in self.table if row["input"] == "menger:2" and row["view.ms_avg"])
         self.assertEqual([y for _, y in sets[1][2]], [times[1]] * 2)
+
+    def test_plot_of_one_codec(self):
+        self.choose_input("a 'sphere' & more")
+        shown = self.script("return charts[4].list.map(p => p.row.codec)")
+        self.assertEqual(shown, ["vq", "vq"])
 
     def test_slider(self):
         for image in self.find("#before, #after"):

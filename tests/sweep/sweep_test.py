@@ -11,6 +11,7 @@ import json
 import os
 import pathlib
 import random
+import re
 import shutil
 import signal
 import subprocess
@@ -138,6 +139,16 @@ class TablesTest(SweepCase):
         self.assertEqual([row["dims"] for row in table[1:3]], ["2x2x2", "64x64x64"])
         for row, cells in zip(self.rows(), table):  # of its voxels, not of the void around them
             self.assertEqual(float(cells["grmse"]), row["encode"]["grmse"])
+
+    def test_front_of_colours(self):
+        """Where nothing but colours is compared, the front is of their error."""
+        spec = self.spec({"inputs": ["menger:2"], "metrics": False, "decode": False, "codecs": [
+            {"tool": "dagcolor-pack", "options": {"codec": ["fws", "vws"], "threshold": [6.38, 25.5, 60], "effort": [1, 3]}}]})
+        self.sweep("--quiet", spec=spec)
+        points = [(int(row["file_bytes"]), float(row["grmse"])) for row in self.table()]
+        expected = [not any(s <= size and e <= error and (s, e) != (size, error) for s, e in points) for size, error in points]
+        self.assertIn(False, expected)
+        self.assertEqual([row["pareto"] == "true" for row in self.table()], expected)
 
     def test_side_by_side(self):
         """As many at a time as fit make the same table."""
@@ -387,6 +398,43 @@ class OutputTest(SweepCase):
         for spec in specs:
             self.assertGreater(json.loads(self.sweep("--dry-run", "--json", spec=spec).stdout)["settings"], 10)
 
+    def test_figures_of_small_volumes(self):
+        """Each makes the plots that it names, of values that there are; of volumes, settings and pictures made small."""
+        if not (BIN.parent / "lib" / "voxkit" / "image_stack.so").exists():
+            self.skipTest("the module image_stack was not built")
+        try:
+            import matplotlib  # noqa: F401
+        except ImportError:
+            self.skipTest("no python3-matplotlib")
+        smaller = ((r"menger:[0-9]", "menger:2"), (r"terrain:512", "menger:1"), (r"(marschner-lobb|sphere):[0-9]+", r"\1:16"),
+                   (r"membrane:[0-9,]+", "membrane:16,16,8"), (r'"size": "[0-9x]+"', '"size": "24x18"'), ("orbit:4", "orbit:1"), ("thesis94", "orbit:1"))
+        for path in sorted((pathlib.Path(__file__).resolve().parents[2] / "scripts" / "figures").glob("*.json")):
+            text = path.read_text(encoding="utf-8")
+            for pattern, replacement in smaller:
+                text = re.sub(pattern, replacement, text)
+            spec = self.few(json.loads(text))
+            with self.subTest(path.name):
+                out = self.folder / path.stem
+                done = self.sweep(spec=self.spec(spec, path.name), out=out)
+                self.assertNotIn("no plot", done.stderr)
+                made = {plot.stem for plot in out.glob("plots/*.png")}
+                for plot in spec["plots"]:
+                    self.assertTrue([name for name in made if name.startswith(plot["name"])], plot["name"])
+
+    @staticmethod
+    def few(spec):
+        """Each input once, two values of one option, and one of the others."""
+        def cut(options):
+            lists = [key for key, value in options.items() if isinstance(value, list)]
+            return {key: value[: 2 if key == lists[-1] else 1] if key in lists else value for key, value in options.items()}
+        for thing in (spec, *spec["codecs"], *spec["plots"]):
+            if "inputs" in thing:
+                thing["inputs"] = list(dict.fromkeys(thing["inputs"]))
+        for codec in spec["codecs"]:
+            grids = codec["options"]
+            codec["options"] = [cut(grid) for grid in grids] if isinstance(grids, list) else cut(grids)
+        return spec | {"repeat": 1, "threads": 1}
+
 
 class BestTest(SweepCase):
     def test_against_the_table(self):
@@ -435,7 +483,7 @@ class SpecTest(unittest.TestCase):
         good = {"inputs": ["a", {"name": "b", "input": "c", "options": {"peak": 1}, "reference": "d"}],
                 "codecs": [{"tool": "svmm-encode", "name": "n", "options": {"quality": [1, 2]}, "inputs": ["b"]}],
                 "renders": [{"name": "r", "options": {"size": "4x4"}, "inputs": ["a"], "codecs": ["n"], "compare": False}],
-                "plots": [{"name": "p", "x": "a", "y": "b", "log": "x", "label": ["quality"], "fit": "power", "line": "all", "baseline": "c", "inputs": ["a"]}],
+                "plots": [{"name": "p", "x": "a", "y": "b", "log": "x", "label": ["quality"], "fit": "power", "line": "all", "baseline": "c", "inputs": ["a"], "codecs": ["n"]}],
                 "metrics": {"peak": 3}, "decode": False, "threads": 2, "timeout": 1.5, "repeat": 2, "keep": True, "title": "t"}
         self.assertEqual(len(self.read(good).codecs[0].settings), 2)
         wrong = [None, True, -1, 10**400, 0.5, "", "x\ny", "-x", "\ud800", [], {}, [[]], {"": {}}, [None], "a" * 1000, {"help": 1}]
@@ -457,6 +505,29 @@ class SpecTest(unittest.TestCase):
                 refused += 1
         self.assertGreater(read, 50)
         self.assertGreater(refused, 200)
+
+    def test_labels_of_plots(self):
+        """None hides another one, or a point, or leaves the chart; what has room has one."""
+        try:
+            from sweep import plots
+            figure, axes = plots.new_figure()
+        except ImportError:
+            self.skipTest("no python3-matplotlib")
+        numbers = random.Random(2)
+        points = [(f"({i}, 90)", numbers.random() ** 3, numbers.random() ** 3) for i in range(60)] + [("", 0.7, 0.7), ("far", 1.5, 0.5)]
+        axes.plot([a for _, a, _ in points], [b for _, _, b in points], "o", markersize=5, label="x")
+        axes.legend()
+        plots.place_labels(figure, axes, points)
+        boxes = {note.get_text(): note.get_window_extent() for note in axes.texts}
+        self.assertGreater(len(boxes), 20)
+        self.assertLess(len(boxes), 61)
+        self.assertIn("far", boxes)
+        self.assertNotIn("", boxes)
+        room = axes.get_window_extent()
+        for name, box in boxes.items():
+            self.assertEqual(box.count_overlaps(list(boxes.values())), 1, name)  # itself
+            self.assertTrue(room.x0 <= box.x0 and box.x1 <= room.x1, name)
+            self.assertFalse(any(box.contains(*axes.transData.transform((a, b))) for _, a, b in points), name)
 
     def test_front(self):
         numbers = random.Random(1)

@@ -17,7 +17,8 @@ SCRIPTS = ("state.js", "charts.js", "table.js", "pictures.js")
 CHART_FILES = (os.path.join(os.path.dirname(__file__), "chart.min.js"), "/usr/share/javascript/chart.js/chart.min.js")
 NAMES = {"percent": "size, %", "bits_per_voxel": "bits per voxel", "psnr_db": "PSNR, dB", "rmse": "RMSE",
          "max_abs_error": "greatest error", "encode_seconds": "encoding, s", "decode_seconds": "decoding, s",
-         "file_bytes": "bytes", "grmse": "RMSE of colours", "color_percent": "colours, %", "snr_db": "SNR, dB",
+         "file_bytes": "bytes", "grmse": "RMSE of colours", "color_percent": "colours, % of 24 bits",
+         "color_bits_per_voxel": "colours, bits per voxel", "snr_db": "SNR, dB",
          "peak_rss_bytes": "peak memory of encoding, bytes", "decode_peak_rss_bytes": "peak memory of decoding, bytes",
          "mean_abs_error": "mean error", "input_mb_per_s": "encoding, MB/s", "levels": "levels", "ratio": "ratio"}
 OF_RENDERS = {"ms_avg": "ms a frame", "psnr_db_avg": "PSNR of pictures, dB", "ms_ssim_avg": "MS-SSIM of pictures",
@@ -25,6 +26,7 @@ OF_RENDERS = {"ms_avg": "ms a frame", "psnr_db_avg": "PSNR of pictures, dB", "ms
               "reference_ms_avg": "ms a frame of the original", "speed_ratio": "speed, original = 1",
               "rmse_avg": "RMSE of pictures"}
 USUAL = ["percent", "bits_per_voxel", "psnr_db", "max_abs_error", "encode_seconds", "decode_seconds"]
+USUAL_OF_COLORS = ["color_percent", "grmse", "encode_seconds", "decode_seconds"]
 
 
 def column_names(columns):
@@ -39,7 +41,8 @@ def column_names(columns):
 
 
 def usual_columns(flats, columns):
-    shown = [column for column in USUAL if column in columns]
+    usual = USUAL_OF_COLORS if table.usual_axes(columns)[0] == "color_percent" else USUAL
+    shown = [column for column in usual if column in columns]
     shown += [column for column in columns if column.endswith((".ms_avg", ".psnr_db_avg", ".ms_ssim_avg"))]
     if any(values["status"] != "done" for values in flats):
         shown += ["status", "error"]
@@ -137,11 +140,13 @@ def page_text(spec, cases, flats, build, machine, work):
         add_pictures([row for row, _ in chosen], [case for _, case in chosen], found)
     plots = [{"title": plot.title, "x": table.find_column(plot.x, columns) or plot.x,
               "y": table.find_column(plot.y, columns) or plot.y, "log": "x" * plot.log_x + "y" * plot.log_y,
-              "baseline": table.find_column(plot.baseline, columns), "line": plot.line, "inputs": sorted(plot.inputs)}
+              "baseline": table.find_column(plot.baseline, columns), "line": plot.line, "inputs": sorted(plot.inputs),
+              "codecs": sorted(plot.codecs)}
              for plot in spec.plots]
     data = {"rows": rows, "columns": [column for column in columns if column != "version"], "names": column_names(columns),
-            "usual": usual_columns(flats, columns), "higher": list(table.HIGHER_IS_BETTER), "plots": plots,
-            "renders": [render.name for render in spec.renders], "machine": machine, "version": f"vox-sweep {build.text()}",
+            "usual": usual_columns(flats, columns), "axes": table.usual_axes(columns),
+            "higher": list(table.HIGHER_IS_BETTER), "plots": plots, "renders": [render.name for render in spec.renders], "machine": machine,
+            "version": f"vox-sweep {build.text()}",
             "pictures": list(found.places)}
     # Within a script element only "<" could end it.
     parts = {"TITLE": html.escape(spec.title or "Sweep"), "STYLE": read_part("page.css"), "CHART": chart_script(),

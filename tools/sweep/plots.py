@@ -11,8 +11,8 @@ from sweep.runner import write_whole
 from sweep.spec import Plot
 
 MADE_OF = ".made-of"  # the file with a digest of the results
-MARKERS = "o^sDvPX*"
-COLORS = ("#0072b2", "#d55e00", "#009e73", "#cc79a7", "#7a6a00", "#56b4e9", "#4d4d4d", "#e69f00")
+MARKERS = "o^sDvPX*"  # one less than colours, so that no two of the first 72 codecs look alike
+COLORS = ("#0072b2", "#d55e00", "#009e73", "#cc79a7", "#7a6a00", "#56b4e9", "#4d4d4d", "#e69f00", "#882255")
 
 
 def available():
@@ -37,13 +37,16 @@ def fresh(spec, flats, folder):
         return False
 
 
-def usual_plots(spec, columns):
+def usual_plots(spec, flats, columns):
     """What every sweep draws, and what its spec asks for."""
     times = [f"{render.name}.ms_avg" for render in spec.renders] + ["decode_seconds", "encode_seconds"]
-    everything = frozenset(entry.name for entry in spec.inputs)
-    usual = [Plot("size-error", "Size and error", "bits_per_voxel", "psnr_db", False, False, (), "front", "", "", everything)]
-    usual += [Plot("time-error", "Time and error", time, "psnr_db", False, False, (), "front", "", "", everything) for time in times
-              if time in columns][:1]
+    inputs, codecs = frozenset(entry.name for entry in spec.inputs), frozenset(codec.name for codec in spec.codecs)
+    size, error = table.usual_axes(columns)
+    usual = [Plot("size-error", "Size and error", size, error, False, False, (), "front", "", "", inputs, codecs)]
+    for name in sorted(inputs):  # the first time that the input has: not every picture is of every input
+        known = {column for values in flats if values["input"] == name for column, value in values.items() if finite(value)}
+        usual += [Plot("time-error", "Time and error", time, error, False, False, (), "front", "", "", frozenset([name]), codecs)
+                  for time in times if time in known][:1]
     asked = {(table.find_column(plot.x, columns), table.find_column(plot.y, columns)) for plot in spec.plots}
     return [plot for plot in usual if plot.y in columns and (plot.x, plot.y) not in asked] + list(spec.plots)
 
@@ -56,7 +59,7 @@ def write(spec, flats, folder):
     columns = table.columns_of(flats)
     names, unknown, written = column_names(columns), [], set()
     os.makedirs(folder, exist_ok=True)
-    for plot in usual_plots(spec, columns):
+    for plot in usual_plots(spec, flats, columns):
         x, y = table.find_column(plot.x, columns), table.find_column(plot.y, columns)
         if x is None or y is None:
             unknown.append(plot.x if x is None else plot.y)
@@ -77,23 +80,25 @@ def write(spec, flats, folder):
 
 def figures(plot, x, y, flats, names, columns):
     """(ending of the file's name, figure): one an input; one of all of them where a curve is fitted."""
-    labels, fit, baseline = plot.label, plot.fit, table.find_column(plot.baseline, columns)
+    fit, baseline = plot.fit, table.find_column(plot.baseline, columns)
     inputs = list(dict.fromkeys(values["input"] for values in flats))
     endings = dict(zip(inputs, endings_of(inputs)))
     inputs = [name for name in inputs if name in plot.inputs]
+    codecs = list(dict.fromkeys(values["codec"] for values in flats))  # a codec looks the same in all plots
     for group in ([inputs] if fit else [[name] for name in inputs]):
-        of_group = [values for values in flats if values["input"] in group and finite(values.get(x))]
+        of_group = [values for values in flats if values["input"] in group and values["codec"] in plot.codecs and finite(values.get(x))]
         points = [values for values in of_group if finite(values.get(y))]
         exact = [values for values in of_group if table.number(values.get(y)) == float("inf")]
         if not points and not exact:
             continue
         figure, axes = new_figure()
-        for index, codec in enumerate(dict.fromkeys(values["codec"] for values in of_group)):
+        labels = []
+        for codec in dict.fromkeys(values["codec"] for values in of_group):
             own = sorted((values for values in points if values["codec"] == codec), key=lambda values: table.number(values[x]))
             across, up = ([table.number(values[column]) for values in own] for column in (x, y))
-            color = COLORS[index % len(COLORS)]
+            color, marker = (kinds[codecs.index(codec) % len(kinds)] for kinds in (COLORS, MARKERS))
             if own:
-                axes.plot(across, up, marker=MARKERS[index % len(MARKERS)], color=color, label=codec, linestyle="none",
+                axes.plot(across, up, marker=marker, color=color, label=codec, linestyle="none",
                           markersize=5, alpha=0.85)
             if plot.line == "all" and not fit:
                 axes.plot(across, up, color=color, linewidth=1)
@@ -101,9 +106,7 @@ def figures(plot, x, y, flats, names, columns):
                 draw_front(axes, x, y, across, up, color)
             if fit:
                 draw_fit(axes, across, up, color, codec)
-            for values, a, b in zip(own, across, up) if labels else ():
-                words = [str(values.get(table.find_column(label, columns) or "", "–")) for label in labels]
-                axes.annotate(f"({', '.join(words)})", (a, b), fontsize=6.5, xytext=(4, 3), textcoords="offset points")
+            labels += zip(label_texts(plot.label, own, columns), across, up)
             lossless = [table.number(values[x]) for values in exact if values["codec"] == codec]
             if lossless:  # infinitely good: the best of these has a line
                 axes.axvline((max if table.higher_is_better(x) else min)(lossless), color=color, linestyle=":", label=f"{codec}, lossless")
@@ -115,7 +118,35 @@ def figures(plot, x, y, flats, names, columns):
                  xscale="log" if plot.log_x else "linear", yscale="log" if plot.log_y else "linear")
         axes.grid(alpha=0.3)
         axes.legend(fontsize=8)
+        place_labels(figure, axes, labels)
         yield "" if fit else endings[group[0]], figure
+
+
+def label_texts(labels, rows, columns):
+    """What stands beside points: those of the options that they have."""
+    found = [table.find_column(label, columns) for label in labels]
+    texts = [[str(values[column]) for column in found if column in values] for values in rows]
+    return [f"({', '.join(words)})" if len(words) > 1 else "".join(words) for words in texts]
+
+
+def place_labels(figure, axes, labels):
+    """Beside their points, on the side where no other one is; where there is none, the label is left out."""
+    if not any(text for text, _, _ in labels):
+        return
+    from matplotlib.transforms import Bbox
+    figure.draw_without_rendering()  # settles where things are
+    room, taken = axes.get_window_extent(), [axes.get_legend().get_window_extent()]
+    taken += [Bbox.from_bounds(x - 3, y - 3, 6, 6) for _, a, b in labels for x, y in [axes.transData.transform((a, b))]]
+    for text, a, b in (label for label in labels if label[0]):
+        for x, y in ((1, 1), (1, -1), (-1, 1), (-1, -1), (0, 1), (0, -1)):
+            note = axes.annotate(text, (a, b), fontsize=6.5, xytext=(4 * x, 4 * y if x else 7 * y), textcoords="offset points",
+                                 ha=("right", "center", "left")[x + 1], va="bottom" if y > 0 else "top")
+            box = note.get_window_extent()
+            if not box.overlaps(room) or box.x1 > room.x1 or box.x0 < room.x0 or box.count_overlaps(taken):
+                note.remove()
+                continue
+            taken.append(box)
+            break
 
 
 def endings_of(inputs):

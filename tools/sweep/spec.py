@@ -57,6 +57,7 @@ class Plot:
     fit: str            # "" or "power": y = a x^b through all points of a codec
     baseline: str       # "", or a column whose median is shown beside y
     inputs: frozenset   # names
+    codecs: frozenset   # names
 
 
 @dataclasses.dataclass(frozen=True)
@@ -144,7 +145,7 @@ def read(name, option_names):
         title=top["title"].text() if "title" in top else "",
         folder=os.getcwd() if name == "-" else os.path.dirname(os.path.abspath(name)),
         inputs=tuple(inputs), codecs=tuple(codecs), renders=tuple(renders),
-        plots=tuple(read_plots(top["plots"], inputs)) if "plots" in top else (),
+        plots=tuple(read_plots(top["plots"], inputs, codecs)) if "plots" in top else (),
         decode=top["decode"].boolean() if "decode" in top else True,
         metrics=read_metrics(top["metrics"], option_names) if "metrics" in top else (),
         threads=top["threads"].number(0, 4096, whole=True) if "threads" in top else 0,
@@ -377,10 +378,11 @@ def option_value(place):
     return place.fail("expected a text, a number, true, false or null, or a list of these")
 
 
-def read_plots(place, inputs):
+def read_plots(place, inputs, codecs):
     names = []
     for item in place.items():
-        keys = item.members(["name", "title", "x", "y", "log", "label", "line", "fit", "baseline", "inputs"], ["name", "x", "y"])
+        keys = item.members(["name", "title", "x", "y", "log", "label", "line", "fit", "baseline", "inputs", "codecs"],
+                            ["name", "x", "y"])
         name = keys["name"].text()
         if not re.fullmatch(r"[A-Za-z0-9][A-Za-z0-9._-]{0,99}", name) or name in names:
             keys["name"].fail("expected a name of letters, digits, dots and dashes that no other has, for files")
@@ -396,4 +398,4 @@ def read_plots(place, inputs):
         yield Plot(name, keys["title"].text() if "title" in keys else name, keys["x"].text(), keys["y"].text(),
                    "x" in log, "y" in log, tuple(label.text() for label in keys["label"].items()) if "label" in keys else (),
                    line, "power" if "fit" in keys else "", keys["baseline"].text() if "baseline" in keys else "",
-                   read_names(keys, "inputs", inputs))
+                   read_names(keys, "inputs", inputs), read_names(keys, "codecs", codecs))

@@ -44,15 +44,23 @@ def rows_of(cases, records, build, machine):
     flats = [flat(row) for row in rows]
     for name in {row["input"] for row in rows}:
         of_input = [(row, values) for row, values in zip(rows, flats) if row["input"] == name]
-        for index in front([(values.get("file_bytes"), distortion(values)) for _, values in of_input]):
+        error = usual_axes({key for _, values in of_input for key in values})[1]
+        for index in front([(values.get("file_bytes"), distortion(values, error)) for _, values in of_input]):
             of_input[index][0]["pareto"] = True
     return rows
 
 
-def distortion(values):
+def usual_axes(columns):
+    """The columns of size and error that are looked at first: of colours alone, where there was no other comparison."""
+    if "psnr_db" not in columns and "grmse" in columns:
+        return "color_percent", "grmse"
+    return "bits_per_voxel", "psnr_db"
+
+
+def distortion(values, column):
     """Less is better."""
-    psnr = number(values.get("psnr_db"))
-    return None if psnr is None else -psnr
+    error = number(values.get(column))
+    return -error if error is not None and higher_is_better(column) else error
 
 
 def number(value):

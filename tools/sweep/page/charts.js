@@ -73,7 +73,7 @@ class Panel {
   // Points; infinity is drawn a little above the greatest number.
   points() {
     const [x, y] = [this.x.value, this.y.value];
-    const points = visible().filter((row) => !this.plot.inputs || this.plot.inputs.includes(row.input)).map((row) => ({ x: number(row[x]), y: number(row[y]), row }))
+    const points = visible().filter((row) => !this.plot.inputs || (this.plot.inputs.includes(row.input) && this.plot.codecs.includes(row.codec))).map((row) => ({ x: number(row[x]), y: number(row[y]), row }))
       .filter((point) => point.x !== undefined && point.y !== undefined && (!this.log[0].checked || point.x > 0) && (!this.log[1].checked || point.y > 0));
     this.tops = {};
     for (const axis of ["x", "y"]) {
@@ -99,7 +99,7 @@ class Panel {
       type: log ? "logarithmic" : "linear", title: { display: true, text: data.names[column] ?? column, font: { size: 13 } },
       afterBuildTicks: (scale) => {
         if (top === undefined) return;
-        scale.ticks = scale.ticks.filter((tick) => tick.value < top - 0.04 * (scale.max - scale.min)).concat({ value: top });
+        scale.ticks = scale.ticks.filter((tick) => tick.value < top - 0.1 * (scale.max - scale.min)).concat({ value: top });
       },
       grace: "4%", min: !log && this.fromZero(axis) ? 0 : undefined,
       ticks: { callback: function (value, index, ticks) {
@@ -183,8 +183,8 @@ function startCharts() {
   Chart.defaults.color = "#1b1f24";
   const times = [...data.renders.map((name) => `${name}.ms_avg`), "decode_seconds", "encode_seconds"].filter((name) => numeric.includes(name));
   const plots = [
-    { title: "Size and error", x: first("bits_per_voxel", "percent"), y: first("psnr_db", "rmse", "grmse"), log: "" },
-    { title: "Time and error", x: times[0] ?? numeric[0], wanted: times, y: first("psnr_db", "rmse", "grmse"), log: "" },
+    { title: "Size and error", x: first(data.axes[0], "percent"), y: first(data.axes[1], "rmse"), log: "" },
+    { title: "Time and error", x: times[0] ?? numeric[0], wanted: times, y: first(data.axes[1], "rmse"), log: "" },
   ];
   // Those that the spec asks for, but for what is there already.
   const usual = plots.map((plot) => `${plot.x} ${plot.y}`);

@@ -13,7 +13,9 @@ function updatePictures() {
   const list = withPictures();
   $("pictures").hidden = list.length === 0;
   if (list.length === 0) return;
-  const row = state.chosen?.pictures && list.includes(state.chosen) ? state.chosen : list.find((candidate) => candidate.pareto) ?? list[0];
+  const front = list.filter((candidate) => candidate.pareto).sort((a, b) => a.file_bytes - b.file_bytes);
+  const usual = front[front.length >> 1] ?? list[0];  // neither the best, which is no sight, nor the smallest
+  const row = state.chosen?.pictures && list.includes(state.chosen) ? state.chosen : usual;
   const views = Object.keys(row.pictures);
   if ([...$("view").options].map((option) => option.value).join() !== views.join())
     $("view").replaceChildren(...views.map((view) => element("option", { value: view, textContent: view })));
@@ -25,7 +27,9 @@ function updatePictures() {
     $(id).alt = `${row.input}, ${what}${id === "after" ? ": " + row.setting : ""}`;
   }
   $("picture-setting").textContent = `${row.input} · ${row.codec} ${settingOf(row)}`;
-  const facts = [["percent", " % of its size"], ["psnr_db", " dB"], [`${view}.psnr_db_avg`, " dB in the picture"], [`${view}.ms_ssim_avg`, " MS-SSIM"]];
+  const size = number(row.color_percent) === undefined ? ["percent", " % of its size"] : ["color_percent", " % of 24 bits a colour"];
+  const facts = [size, ["psnr_db", " dB"], ["grmse", " RMSE of colours"], [`${view}.psnr_db_avg`, " dB in the picture"],
+    [`${view}.ms_ssim_avg`, " MS-SSIM"]];
   $("picture-numbers").textContent = facts.filter(([column]) => number(row[column]) !== undefined)
     .map(([column, unit]) => shown(row[column]) + unit).join(", ");
   $("pictures").dataset.row = row.index;

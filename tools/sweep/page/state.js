@@ -9,8 +9,8 @@ const inputs = [...new Set(rows.map((row) => row.input))];
 const codecs = [...new Set(rows.map((row) => row.codec))];
 
 // Of Okabe and Ito: told apart by those who do not see all colours; shapes differ as well.
-const colors = ["#0072b2", "#d55e00", "#009e73", "#cc79a7", "#7a6a00", "#56b4e9", "#4d4d4d", "#e69f00"];
-const shapes = ["circle", "triangle", "rect", "rectRot", "star", "cross", "crossRot", "dash"];
+const colors = ["#0072b2", "#d55e00", "#009e73", "#cc79a7", "#7a6a00", "#56b4e9", "#4d4d4d", "#e69f00", "#882255"];
+const shapes = ["circle", "triangle", "rect", "rectRot", "star", "cross", "crossRot", "rectRounded"];
 const color = (codec) => colors[codecs.indexOf(codec) % colors.length];
 const shape = (codec) => shapes[codecs.indexOf(codec) % shapes.length];
 
