@@ -117,6 +117,9 @@ struct Decoder {
   const size_t stop;  ///< level whose voxels are wanted
   const VoxelFormat format = volume.info_.format;
   const Layout layout = volume.params_.layout;
+  /// Whether base blocks hold the voxels themselves.
+  const bool stored_as_is =
+      volume.params_.base == Base::raw && layout == Layout::plain && format != VoxelFormat::bitmap;
 
   size_t root() const { return volume.levels_.size() - 1; }
   /// Whether blocks of level k have links. The base has none (in a volume of one level, the root is the
@@ -127,6 +130,14 @@ struct Decoder {
   }
   Result<const std::byte*> block(size_t k, uint64_t number) const {
     return volume.store_->block(volume, k, number);
+  }
+  /// The same, if its chunk has been verified; else null, and `block` tells.
+  const std::byte* known_block(size_t k, uint64_t number) const {
+    const Store::LevelStore& level = volume.store_->levels[k];
+    if (number >= level.blocks) return nullptr;
+    const uint64_t chunk = number >> level.chunk_log2;
+    const std::byte* const bytes = level.found[chunk].load(std::memory_order_acquire);
+    return bytes == nullptr ? nullptr : bytes + (number - (chunk << level.chunk_log2)) * level.block_bytes;
   }
   /// Base voxels, in voxels of the stop level, along the edge of one voxel of level k.
   int64_t scale(size_t k) const {
@@ -175,6 +186,8 @@ struct Decoder {
     if (!structural(k)) return decode_base(bytes, origin, size, parent, box, out);
     const int64_t edge = scale(k);
     const StructuralBlock here = structural_block(k, bytes);
+    const bool whole = box.contains({origin * edge, (origin + size) * edge});
+    const bool copies = k == 1 && whole && stored_as_is;  // base blocks, as a whole
     // Voxels of the block that the box touches, widened to subblocks.
     const Box touched =
         intersect({box.lo / Index3(edge) - origin, ceil_divide(box.hi, edge) - origin}, {Index3(0), size});
@@ -183,19 +196,34 @@ struct Decoder {
         for (int64_t x = touched.lo.x & ~1; x < touched.hi.x; x += 2) {
           const int64_t s = subblock_index({x, y, z}, size);
           const Link link = here.link(s);
+          uint64_t next = link.first;  // as link.child, one after the other
           for (int i = 0; i < 8; ++i) {
+            const bool has_block = (link.mask >> i & 1u) != 0;
+            const uint64_t number = next;
+            next += has_block ? 1 : 0;
             const Index3 v = origin + Index3(x + (i & 1), y + (i >> 1 & 1), z + (i >> 2));
-            const Box part = intersect({v * edge, (v + Index3(1)) * edge}, box);
+            Box part{v * edge, (v + Index3(1)) * edge};
+            if (!whole) part = intersect(part, box);
             if (part.empty()) continue;
+            const Index3 at = part.lo - box.lo;
+            const VoxelSpan there{out.row(at.y, at.z) + at.x * voxel_bytes(format), out.row_stride,
+                                  out.slice_stride};
             const Voxel value = here.value(s * 8 + i);
-            if (k > stop && (link.mask >> i & 1u)) {
-              VOX_TRY(const std::byte* child, block(k - 1, link.child(i)));
-              VOX_CHECK(
-                  decode_block(k - 1, child, v * int64_t{volume.levels_[k - 1].blockwidth}, value, box, out));
+            if (k > stop && has_block) {
+              const std::byte* child = known_block(k - 1, number);
+              if (child == nullptr) {
+                VOX_TRY(child, block(k - 1, number));
+              }
+              if (copies) {
+                copy_in_block(child, Index3(edge), {Index3(0), Index3(edge)}, there);
+              } else {
+                VOX_CHECK(decode_block(k - 1, child, v * int64_t{volume.levels_[k - 1].blockwidth}, value,
+                                       box, out));
+              }
+            } else if (whole && edge == 2) {
+              fill_eight(decoded_value(value, format), there);
             } else {
-              const Index3 at = part.lo - box.lo;
-              fill({out.row(at.y, at.z) + at.x * voxel_bytes(format), out.row_stride, out.slice_stride},
-                   part.size(), format, decoded_value(value, format));
+              fill(there, part.size(), format, decoded_value(value, format));
             }
           }
         }
@@ -233,26 +261,69 @@ struct Decoder {
   Status decode_base(const std::byte* bytes, Index3 origin, Index3 size, const Voxel& parent, const Box& box,
                      VoxelSpan out) const {
     const Box part = intersect({origin, origin + size}, box);
-    const size_t stride = static_cast<size_t>(voxel_bytes(format));
-    const bool stored_as_is =
-        volume.params_.base == Base::raw && layout == Layout::plain && format != VoxelFormat::bitmap;
     thread_local std::vector<std::byte> decoded;
     if (!stored_as_is) {
-      decoded.resize(static_cast<size_t>(size.x * size.y * size.z) * stride);
+      decoded.resize(static_cast<size_t>(size.x * size.y * size.z * voxel_bytes(format)));
       decode_base_block(bytes, size, format, volume.params_.base, layout, parent, decoded.data());
       bytes = decoded.data();
     }
-    const Index3 lo = part.lo - origin, hi = part.hi - origin, shift = origin - box.lo;
+    const Box within{part.lo - origin, part.hi - origin};
+    const Index3 to = part.lo - box.lo;
+    copy_in_block(bytes, size, within,
+                  {out.row(to.y, to.z) + to.x * voxel_bytes(format), out.row_stride, out.slice_stride});
+    return {};
+  }
+
+  /// Copies the voxels of a part of a block, which are in block order, to rows.
+  void copy_in_block(const std::byte* bytes, Index3 size, const Box& part, VoxelSpan out) const {
+    switch (voxel_bytes(format)) {
+      case 1:
+        return copy_voxels<1>(bytes, size, part, out);
+      case 2:
+        return copy_voxels<2>(bytes, size, part, out);
+      case 3:
+        return copy_voxels<3>(bytes, size, part, out);
+      default:
+        return copy_voxels<4>(bytes, size, part, out);
+    }
+  }
+  /// Sets 2^3 voxels to one value.
+  void fill_eight(const Voxel& value, VoxelSpan out) const {
+    switch (voxel_bytes(format)) {
+      case 1:
+        return fill_rows<1>(value, out);
+      case 2:
+        return fill_rows<2>(value, out);
+      case 3:
+        return fill_rows<3>(value, out);
+      default:
+        return fill_rows<4>(value, out);
+    }
+  }
+  template <size_t stride>
+  static void fill_rows(const Voxel& value, VoxelSpan out) {
+    std::array<std::byte, 2 * stride> pair;
+    std::memcpy(pair.data(), value.bytes.data(), stride);
+    std::memcpy(pair.data() + stride, value.bytes.data(), stride);
+    for (int row = 0; row < 4; ++row) std::memcpy(out.row(row & 1, row >> 1), pair.data(), pair.size());
+  }
+  template <size_t stride>
+  static void copy_voxels(const std::byte* bytes, Index3 size, const Box& part, VoxelSpan out) {
+    if (size == Index3(2) && part == Box{Index3(0), size}) {  // nearly all there are where blocks are small
+      for (int row = 0; row < 4; ++row)
+        std::memcpy(out.row(row & 1, row >> 1), bytes + 2 * stride * static_cast<size_t>(row), 2 * stride);
+      return;
+    }
+    const Index3 lo = part.lo, hi = part.hi;
     for (int64_t z = lo.z; z < hi.z; ++z)
       for (int64_t y = lo.y; y < hi.y; ++y) {
-        std::byte* row = out.row(y + shift.y, z + shift.z) + (lo.x + shift.x) * static_cast<int64_t>(stride);
+        std::byte* row = out.row(y - lo.y, z - lo.z);
         const std::byte* in = bytes + static_cast<size_t>(voxel_index({lo.x & ~1, y, z}, size)) * stride;
         int64_t x = lo.x;
         if (x & 1) std::memcpy(row, in + stride, stride), row += stride, in += 8 * stride, ++x;
         for (; x + 2 <= hi.x; x += 2, row += 2 * stride, in += 8 * stride) std::memcpy(row, in, 2 * stride);
         if (x < hi.x) std::memcpy(row, in, stride);
       }
-    return {};
   }
 };
 
