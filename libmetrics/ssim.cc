@@ -5,8 +5,10 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <cstring>
 #include <vector>
 
+#include "formats/cpu.h"
 #include "formats/parallel.h"
 
 namespace voxkit {
@@ -30,18 +32,70 @@ struct Gaussian {
   std::array<double, max_taps> weights{};
 };
 
-/// out = the sum of weight k times tap(k), which are rows of n values. Taps of equal weight are added first.
-template <class Tap>
-void filter(const Gaussian& g, const Tap& tap, int64_t n, double* __restrict out) {
-  std::fill_n(out, n, 0.0);
-  for (int k = 0; k < g.taps / 2; ++k) {
-    const double *p = tap(k), *q = tap(g.taps - 1 - k), w = g.weights[static_cast<size_t>(k)];
-    for (int64_t i = 0; i < n; ++i) out[i] += w * (p[i] + q[i]);
+/// Inner loops are part of the functions that call them, which are compiled for different machines. Without
+/// contraction, and with sums in one order, all of them give the same bits, one by one or several side by
+/// side.
+#define VOXKIT_INLINE [[gnu::always_inline]] inline
+#define VOXKIT_LAMBDA __attribute__((always_inline))
+
+typedef double Doubles __attribute__((vector_size(32)));
+constexpr int64_t lanes = 4;
+template <class Real>
+VOXKIT_INLINE Real load(const double* from) {
+  Real x;
+  std::memcpy(&x, from, sizeof x);
+  return x;
+}
+template <class Real>
+VOXKIT_INLINE void store(double* to, const Real& x) {
+  std::memcpy(to, &x, sizeof x);
+}
+/// Calls `body(i, Real{})` for all of 0 .. n - 1, as many at a time as Real holds.
+template <class Body>
+VOXKIT_INLINE void for_each_lane(int64_t n, const Body& body) {
+  int64_t i = 0;
+  for (; i + lanes <= n; i += lanes) body(i, Doubles{});
+  for (; i < n; ++i) body(i, double{});
+}
+
+/// Rows under the filter.
+using Rows = std::array<const double*, max_taps>;
+
+/// The sum of weight k times what row k has at i. Rows of equal weight are added first.
+template <class Real, int taps>
+VOXKIT_INLINE Real weighted(const Rows& rows, const std::array<double, max_taps>& weights, int64_t i) {
+  Real sum{};
+#pragma GCC unroll 5
+  for (size_t k = 0; k < taps / 2; ++k)
+    sum += weights[k] * (load<Real>(rows[k] + i) + load<Real>(rows[taps - 1 - k] + i));
+  if (taps % 2 != 0) sum += weights[taps / 2] * load<Real>(rows[taps / 2] + i);
+  return sum;
+}
+/// The same for rows of n values.
+VOXKIT_INLINE void filter(const Gaussian& g, const Rows& rows, int64_t n, double* out) {
+  if (g.taps == max_taps) {
+    const Rows at = rows;
+    const std::array<double, max_taps> weights = g.weights;
+    for_each_lane(n, [&](int64_t i, auto real) VOXKIT_LAMBDA {
+      store(out + i, weighted<decltype(real), max_taps>(at, weights, i));
+    });
+    return;
   }
-  if (g.taps % 2 != 0) {
-    const double *p = tap(g.taps / 2), w = g.weights[static_cast<size_t>(g.taps / 2)];
-    for (int64_t i = 0; i < n; ++i) out[i] += w * p[i];
+  for (int64_t i = 0; i < n; ++i) {
+    double sum = 0;
+    const auto taps = static_cast<size_t>(g.taps);
+    for (size_t k = 0; k < taps / 2; ++k) sum += g.weights[k] * (rows[k][i] + rows[taps - 1 - k][i]);
+    if (taps % 2 != 0) sum += g.weights[taps / 2] * rows[taps / 2][i];
+    out[i] = sum;
   }
+}
+template <class Real>
+VOXKIT_INLINE Real greater(const Real& a, const Real& b) {
+  return a < b ? b : a;  // as std::max: a NaN in a passes through
+}
+template <class Real>
+VOXKIT_INLINE Real lesser(const Real& a, const Real& b) {
+  return b < a ? b : a;
 }
 
 struct Sums {
@@ -56,7 +110,7 @@ class Block {
   Block(const Gaussian& gx, const Gaussian& gy, double c1, double c2) : gx_(gx), gy_(gy), c1_(c1), c2_(c2) {}
 
   /// The windows whose upper left samples are (x0, y0) .. (x1, y1), half open.
-  Sums sums(const Image& a, const Image& b, int64_t x0, int64_t y0, int64_t x1, int64_t y1) {
+  VOXKIT_INLINE Sums sums(const Image& a, const Image& b, int64_t x0, int64_t y0, int64_t x1, int64_t y1) {
     const int64_t n = x1 - x0;
     std::fill_n(ssim_, n, 0.0);
     std::fill_n(contrast_structure_, n, 0.0);
@@ -78,7 +132,7 @@ class Block {
   enum Moment { mean_a, mean_b, squares, product, moments };
   using Row = double[width];
 
-  void filter_row(const float* a, const float* b, int64_t n, Row* out) {
+  VOXKIT_INLINE void filter_row(const float* a, const float* b, int64_t n, Row* out) {
     const int64_t samples = n + gx_.taps - 1;
     for (int64_t i = 0; i < samples; ++i) {
       const double va = a[i], vb = b[i];
@@ -87,27 +141,33 @@ class Block {
       moments_[squares][i] = va * va + vb * vb;
       moments_[product][i] = va * vb;
     }
-    for (int m = 0; m < moments; ++m)
-      filter(
-          gx_, [&](int k) { return moments_[m] + k; }, n, out[m]);
+    for (int m = 0; m < moments; ++m) {
+      Rows rows{};
+      for (int k = 0; k < gx_.taps; ++k) rows[static_cast<size_t>(k)] = moments_[m] + k;
+      filter(gx_, rows, n, out[m]);
+    }
   }
 
-  void add_windows(int64_t top, int64_t n) {
-    for (int m = 0; m < moments; ++m)
-      filter(
-          gy_, [&](int k) { return filtered_[(top + k) % gy_.taps][m]; }, n, means_[m]);
-    for (int64_t i = 0; i < n; ++i) {
-      const double a = means_[mean_a][i], b = means_[mean_b][i];
-      const double ab = a * b, aa_bb = a * a + b * b;
+  VOXKIT_INLINE void add_windows(int64_t top, int64_t n) {
+    for (int m = 0; m < moments; ++m) {
+      Rows rows{};
+      for (int k = 0; k < gy_.taps; ++k) rows[static_cast<size_t>(k)] = filtered_[(top + k) % gy_.taps][m];
+      filter(gy_, rows, n, means_[m]);
+    }
+    for_each_lane(n, [&](int64_t i, auto real) VOXKIT_LAMBDA {
+      using Real = decltype(real);
+      const Real a = load<Real>(means_[mean_a] + i), b = load<Real>(means_[mean_b] + i);
+      const Real ab = a * b, aa_bb = a * a + b * b;
       // Where a sample is huge, rounding could break |2 covariance| <= sum of variances; a NaN passes
       // through.
-      const double variances = std::max(means_[squares][i] - aa_bb, 0.0);
-      const double covariance2 = std::min(std::max(2 * (means_[product][i] - ab), -variances), variances);
-      const double contrast_structure = (covariance2 + c2_) / (variances + c2_);
-      const double luminance = (2 * ab + c1_) / (aa_bb + c1_);
-      contrast_structure_[i] += contrast_structure;
-      ssim_[i] += luminance * contrast_structure;
-    }
+      const Real variances = greater(Real(load<Real>(means_[squares] + i) - aa_bb), Real{});
+      const Real covariance2 =
+          lesser(greater(Real(2 * (load<Real>(means_[product] + i) - ab)), Real(-variances)), variances);
+      const Real contrast_structure = (covariance2 + c2_) / (variances + c2_);
+      const Real luminance = (2 * ab + c1_) / (aa_bb + c1_);
+      store(contrast_structure_ + i, Real(load<Real>(contrast_structure_ + i) + contrast_structure));
+      store(ssim_ + i, Real(load<Real>(ssim_ + i) + luminance * contrast_structure));
+    });
   }
 
   const Gaussian &gx_, &gy_;
@@ -117,6 +177,22 @@ class Block {
   Row means_[moments];
   Row ssim_, contrast_structure_;  ///< summed along y
 };
+
+/// The windows of a block whose upper left samples are (x0, y0) .. (x1, y1), half open.
+struct Windows {
+  const Image &a, &b;
+  int64_t x0, y0, x1, y1;
+};
+Sums sums_generic(Block& block, const Windows& w) {
+  return block.sums(w.a, w.b, w.x0, w.y0, w.x1, w.y1);
+}
+#ifdef VOXKIT_AVX2
+[[gnu::target("avx2")]] Sums sums_avx2(Block& block, const Windows& w) {
+  return block.sums(w.a, w.b, w.x0, w.y0, w.x1, w.y1);
+}
+#else
+constexpr auto sums_avx2 = sums_generic;
+#endif
 
 /// The means over all windows of one scale.
 Result<Sums> mean_ssim(const Image& a, const Image& b, double peak, const Context& ctx) {
@@ -129,8 +205,8 @@ Result<Sums> mean_ssim(const Image& a, const Image& b, double peak, const Contex
   VOX_CHECK(parallel_for(ctx, blocks, [&](int64_t i) -> Status {
     const int64_t x = i % across * Block::width, y = i / across * Block::height;
     Block block(gx, gy, c1, c2);
-    parts[static_cast<size_t>(i)] =
-        block.sums(a, b, x, y, std::min(x + Block::width, width), std::min(y + Block::height, height));
+    const Windows windows{a, b, x, y, std::min(x + Block::width, width), std::min(y + Block::height, height)};
+    parts[static_cast<size_t>(i)] = has_avx2() ? sums_avx2(block, windows) : sums_generic(block, windows);
     return {};
   }));
   Sums total;
