@@ -27,6 +27,7 @@ struct Options {
   OpenOptions open;
   int64_t quality = static_cast<int64_t>(ASTCENC_PRE_MEDIUM);
   std::string profile = "ldr";
+  std::vector<int64_t> blocks = {3, 4, 5, 6};
 };
 
 void declare(cli::CommandLine& line, Options& o) {
@@ -35,6 +36,11 @@ void declare(cli::CommandLine& line, Options& o) {
               cli::integer(o.quality, 0, 100));
   line.option("--profile", "ldr|hdr", "Of 8 bits, or of half floats (ldr)",
               cli::one_of(o.profile, {"ldr", "hdr"}));
+  line.option("--block", "N[,N]", "Edges of blocks, 3 to 6 (3,4,5,6)",
+              [&o](const std::string& text) -> Status {
+                VOX_TRY(o.blocks, cli::read_integers(text, 3, 6));
+                return {};
+              });
   cli::declare_input_options(line, o.open);
 }
 
@@ -86,7 +92,8 @@ struct ContextCloser {
 };
 
 /// Compresses and decompresses with cubic blocks, and compares.
-Result<Json> measure(Texture& texture, unsigned edge, const Options& o, Context& ctx) {
+Result<Json> measure(Texture& texture, unsigned edge, const Options& o, cli::Run& run) {
+  Context& ctx = run.ctx;
   const astcenc_profile profile = o.profile == "ldr" ? ASTCENC_PRF_LDR : ASTCENC_PRF_HDR_RGB_LDR_A;
   astcenc_config config{};
   VOX_CHECK(check(astcenc_config_init(profile, edge, edge, edge, static_cast<float>(o.quality),
@@ -109,14 +116,18 @@ Result<Json> measure(Texture& texture, unsigned edge, const Options& o, Context&
   std::vector<uint8_t> file(blocks * 16);
   astcenc_image image = texture.view();
   const astcenc_swizzle grey{ASTCENC_SWZ_R, ASTCENC_SWZ_R, ASTCENC_SWZ_R, ASTCENC_SWZ_1};
+  const double start = run.seconds();
   VOX_CHECK(parallel_for(ctx, ctx.threads, [&](int64_t thread) {
     return check(
         astcenc_compress_image(raw, &image, &grey, file.data(), file.size(), static_cast<unsigned>(thread)));
   }));
+  const double middle = run.seconds();
   VOX_CHECK(parallel_for(ctx, ctx.threads, [&](int64_t thread) {
     return check(astcenc_decompress_image(raw, file.data(), file.size(), &image, &grey,
                                           static_cast<unsigned>(thread)));
   }));
+
+  const double end = run.seconds();
 
   double squares = 0, greatest = 0;
   for (size_t i = 0; i < texture.values.size(); ++i) {
@@ -132,6 +143,7 @@ Result<Json> measure(Texture& texture, unsigned edge, const Options& o, Context&
   json.set("bits_per_voxel", 8 * static_cast<double>(file.size()) / voxels);
   json.set("psnr_db", 10 * std::log10(texture.peak * texture.peak * voxels / squares));
   json.set("max_abs_error", greatest);
+  json.set("encode_seconds", middle - start).set("decode_seconds", end - middle);
   return json;
 }
 
@@ -144,8 +156,8 @@ Result<int> work(const Options& o, cli::Run& run) {
       .set("quality", o.quality)
       .set("profile", o.profile);
   Json results = Json::array();
-  for (unsigned edge = 3; edge <= 6; ++edge) {
-    VOX_TRY(Json result, measure(*texture, edge, o, run.ctx));
+  for (const int64_t edge : o.blocks) {
+    VOX_TRY(Json result, measure(*texture, static_cast<unsigned>(edge), o, run));
     results.push(std::move(result));
   }
   json.set("results", std::move(results));

@@ -5,7 +5,7 @@ Every INPUT is drawn by VTK's vtkFixedPointVolumeRayCastMapper, and by vox-rende
 forms (RBUC, packed), and k-means to 1/16 of the bricks. Same cameras (an orbit), transfer function, opacity for a way,
 sample distance, threads and light. All draw the orbit in turn, some rounds; a frame's time is the least of its rounds,
 and the table has the least and the median frame. MS-SSIM, by voxdiff, is between VTK's pictures and ours; they are kept
-with -o. Needs Debian's python3-vtk9 (with /usr/bin/python3) and xvfb.
+with -o; --json prints JSON instead. Needs Debian's python3-vtk9 (with /usr/bin/python3) and xvfb.
 """
 import argparse
 import json
@@ -219,6 +219,7 @@ def main():
     parser.add_argument("--frames", type=int, default=6, help="of the orbit (6)")
     parser.add_argument("--rounds", type=int, default=3)
     parser.add_argument("--threads", type=int, default=1)
+    parser.add_argument("--json", action="store_true")
     options = parser.parse_args()
     if "DISPLAY" not in os.environ:
         if shutil.which("xvfb-run") is None:
@@ -229,10 +230,12 @@ def main():
         folder = pathlib.Path(temporary)
         options.output = options.output or folder
         options.output.mkdir(parents=True, exist_ok=True)
-        print(f"VTK {vtkVersion.GetVTKVersion()}; step {options.step}, {options.threads} threads, {options.frames} frames "
-              f"of an orbit, least of {options.rounds} rounds; load {os.getloadavg()[0]:.1f}\n")
-        print("| volume | size | light | who | ms min | ms median | VTK / it | it / dense | lit / unlit | MS-SSIM min |")
-        print("| --- | --- | --- | --- | ---: | ---: | ---: | ---: | ---: | ---: |")
+        rows = []
+        say = (lambda *_, **__: None) if options.json else print
+        say(f"VTK {vtkVersion.GetVTKVersion()}; step {options.step}, {options.threads} threads, {options.frames} frames "
+            f"of an orbit, least of {options.rounds} rounds; load {os.getloadavg()[0]:.1f}\n")
+        say("| volume | size | light | who | ms min | ms median | VTK / it | it / dense | lit / unlit | MS-SSIM min |")
+        say("| --- | --- | --- | --- | ---: | ---: | ---: | ---: | ---: | ---: |")
         for pair in options.volumes:
             volume, transfer = pair.rsplit(":", 1)
             name = pathlib.Path(volume).name.split(".")[0]
@@ -257,8 +260,14 @@ def main():
                                  f"{lit.median(who) / unlit.median(who):.2f}" if one is lit else "",
                                  f"{min(one.similar):.4f}" if who == "dense" else
                                  f"(first frame {one.first:.1f} s)" if who == "VTK" else ""]
-                        print("| " + " | ".join(cells) + " |", flush=True)
-        print(f"\nload {os.getloadavg()[0]:.1f} after")
+                        say("| " + " | ".join(cells) + " |", flush=True)
+                        rows.append({"volume": name, "size": size, "light": "on" if one is lit else "off", "who": who,
+                                     "ms_min": min(ms), "ms_median": one.median(who),
+                                     "vtk_ratio": one.median("VTK") / one.median(who),
+                                     "dense_ratio": one.median(who) / one.median("dense"), "ms_ssim_min": min(one.similar)})
+        if options.json:
+            print(json.dumps({"vtk": vtkVersion.GetVTKVersion(), "rows": rows}))
+        say(f"\nload {os.getloadavg()[0]:.1f} after")
 
 
 if __name__ == "__main__":

@@ -1,0 +1,90 @@
+#!/usr/bin/env python3
+"""Every figure that the README gives of its own is a row of results.csv: claims_test.py README.md results.csv
+
+Figures in the examples are not meant: these are run by a test of their own. A claim is a pattern of the README's words, with a
+group for each figure, and the row and column where each comes from; a figure must be that of the row, rounded as it is in the README.
+Comparisons in words are claims, too, as conditions on rows.
+"""
+import csv
+import pathlib
+import re
+import sys
+
+PICTURES = "readme"
+MILLION = 1e6
+
+
+def row_of(rows, *key):
+    row = rows.get(key)
+    if row is None:
+        sys.exit(f"results.csv has no row {key}")
+    return row
+
+
+# Words, and where each of their figures comes from: section, data, what, setting; column; unit.
+FIGURES = [
+    (r"RGBA, ([\d.]+) % of its size", [((PICTURES, "menger:5", "svmm-encode", "--quality 80 --base bitmap --blockwidth 4"), "percent", 1)]),
+    (r"density, a CT scan, ([\d.]+) %", [((PICTURES, "engine.nii.gz", "svmm-encode", "--quality 96"), "percent", 1)]),
+    (r"fog of an OpenVDB file, ([\d.]+) %", [((PICTURES, "smoke.vdb", "svmm-encode", "--quality 99.7"), "percent", 1)]),
+    (r"surface of a mesh, ([\d.]+) million voxels, colours ([\d.]+) %",
+     [((PICTURES, "LeePerrySmith.obj", "dagcolor-pack", "--resolution 2048"), "voxels", MILLION),
+      ((PICTURES, "LeePerrySmith.obj", "dagcolor-pack", "--resolution 2048"), "percent", 1)]),
+    (r"\| ([\d.]+) million voxels, ([\d.]+) % \| a voxel model, ([\d.]+) million voxels, ([\d.]+) %",
+     [((PICTURES, "scene.gltf", "dagcolor-pack", "--resolution 2048"), "voxels", MILLION),
+      ((PICTURES, "scene.gltf", "dagcolor-pack", "--resolution 2048"), "percent", 1),
+      ((PICTURES, "scene_store8.vox", "dagcolor-pack", ""), "voxels", MILLION),
+      ((PICTURES, "scene_store8.vox", "dagcolor-pack", ""), "percent", 1)]),
+    (r"`terrain:4096`, ([\d.]+) million voxels, colours ([\d.]+) %",
+     [((PICTURES, "terrain:4096", "dagcolor-pack", ""), "voxels", MILLION),
+      ((PICTURES, "terrain:4096", "dagcolor-pack", ""), "percent", 1)]),
+    (r"at (\d+), (\d+) and (\d+) %, at (\d+), (\d+) and (\d+) %, and at (\d+), (\d+) and\s+(\d+) %",
+     [((PICTURES, data, what, setting), "percent", 1) for data, what, settings in (
+         ("menger:5", "svmm-encode", ("-q 100", "-q 90", "-q 80 -b bitmap -w 4")),
+         ("membrane:512,512,64:1", "svmm-encode", ("-q 100", "-q 90", "-q 70")),
+         ("marschner-lobb:128", "vq-encode", ("--lossless", "--max-error 256", "--reduce 16"))) for setting in settings]),
+]
+
+
+def bits(rows, section, what, setting):
+    return float(row_of(rows, section, "skull", what, setting)["bits_per_voxel"])
+
+
+def smaller(rows):
+    """Bits a voxel of the CT, from svmm-encode's lossless file to that of k-means."""
+    svmm, vq = bits(rows, "lossless", "svmm-encode", "-q 100"), bits(rows, "lossless", "vq-encode", "")
+    return svmm > 2 * vq and vq > bits(rows, "bounded", "vq-encode", "--max-error 40") > bits(rows, "small", "vq-encode", "--reduce 16")
+
+
+CONDITIONS = [
+    (r"it makes scans much smaller than `svmm-encode`; `--max-error` makes them smaller still, and k-means,", smaller),
+]
+
+
+def main():
+    readme, results = map(pathlib.Path, sys.argv[1:])
+    text = re.sub(r"\s+", " ", readme.read_text(encoding="utf-8"))
+    with results.open(newline="", encoding="utf-8") as file:
+        rows = {(row["section"], row["data"], row["what"], row["setting"]): row for row in csv.DictReader(file)}
+    wrong, figures = [], 0
+    for pattern, places in FIGURES:
+        found = re.search(re.sub(r"\\s\+", " ", pattern), text)
+        if found is None:
+            wrong.append(f"not in the README any more: {pattern}")
+            continue
+        for said, (key, column, unit) in zip(found.groups(), places, strict=True):
+            decimals = len(said.partition(".")[2])
+            measured = f"{float(row_of(rows, *key)[column]) / unit:.{decimals}f}"
+            figures += 1
+            if measured != said:
+                wrong.append(f"{' '.join(key)}: {column} is {measured}, but the README says {said}")
+    for pattern, holds in CONDITIONS:
+        if not re.search(pattern, text):
+            wrong.append(f"not in the README any more: {pattern}")
+        elif not holds(rows):
+            wrong.append(f"does not hold: {pattern}")
+    print("\n".join(wrong) or f"{figures} figures and {len(CONDITIONS)} comparisons hold")
+    sys.exit(1 if wrong else 0)
+
+
+if __name__ == "__main__":
+    main()
