@@ -36,5 +36,21 @@ VOX_HD_HOT void unpack8(const std::byte* bytes, int width, uint16_t* out) {
     for (int i = 0; i < 4; ++i) out[4 * half + i] = static_cast<uint16_t>(word >> (i * width) & mask);
   }
 }
+/// The inverse: eight values of `width` bits, 0 to 16, no more, from a byte on. Stores 8 bytes, 16 for widths
+/// above 8; what is behind the values becomes zero.
+inline void pack8(const uint16_t* values, int width, std::byte* bytes) {
+  uint64_t halves[2] = {};
+  for (int i = 0; i < 4; ++i) {
+    halves[0] |= uint64_t{values[i]} << (i * width);
+    halves[1] |= uint64_t{values[4 + i]} << (i * width);
+  }
+  const int at = 4 * width;  // where the second half begins
+  if (at <= 32) {
+    store_le(bytes, halves[0] | halves[1] << at);
+    return;
+  }
+  store_le(bytes, halves[0] | (at < 64 ? halves[1] << at : 0));
+  store_le(bytes + 8, halves[1] >> (64 - at));
+}
 
 }  // namespace voxkit::vq

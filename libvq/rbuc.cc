@@ -97,21 +97,27 @@ int encode_codeword(const Brick& brick, BrickRange range, std::byte* bytes) {
       best = t;
       plan = other;
     }
-  std::fill_n(bytes, plan.length + 8, std::byte{0});
   bytes[0] = static_cast<std::byte>(plan.c2 | best << 6);
-  int at = 1 + plan.c2;
+  uint64_t widths = 0;
+  for (int octant = 0; octant < 8; ++octant)
+    widths |= static_cast<uint64_t>(plan.c1[octant]) << (octant * plan.c2);
+  store_le(bytes + 1, widths);
+  std::byte* at = bytes + 1 + plan.c2;
   for (uint32_t octant = 0; octant < 8; ++octant) {
-    const int c1 = plan.c1[octant];
-    store_bits(bytes + 1, octant * static_cast<uint32_t>(plan.c2), static_cast<uint32_t>(c1));
-    for (uint32_t i = 0; i < 8; ++i)
-      store_bits(bytes + at, i * static_cast<uint32_t>(c1), residuals.of[best][octant_voxel(octant, i)]);
-    at += c1;
+    uint16_t values[8];
+    for (uint32_t i = 0; i < 8; ++i) values[i] = residuals.of[best][octant_voxel(octant, i)];
+    pack8(values, plan.c1[octant], at);
+    at += plan.c1[octant];
   }
   return plan.length;
 }
 
 void encode_plain(const Brick& brick, uint32_t base, int bits, std::byte* bytes) {
-  for (size_t i = 0; i < brick.size(); ++i) store_bits(bytes, i * static_cast<size_t>(bits), brick[i] - base);
+  uint16_t row[8];
+  for (size_t at = 0; at < brick.size(); at += 8, bytes += bits) {
+    for (size_t i = 0; i < 8; ++i) row[i] = static_cast<uint16_t>(brick[at + i] - base);
+    pack8(row, bits, bytes);
+  }
 }
 
 bool decode_plain(const std::byte* bytes, int bits, BrickRange range, uint16_t* voxels) {

@@ -16,6 +16,7 @@ import codebooks
 import compression
 import drawing
 import everyday
+import kernels
 import peers
 import readme
 import surfaces
@@ -25,7 +26,7 @@ from table import FIXED, MEASURED, Markdown, merge_fixed, write_csv
 OF_INPUTS = ["lossless", "bounded", "small", "colors", "surfaces"]
 SECTIONS = {"lossless": compression.lossless, "bounded": compression.bounded, "small": compression.small, "colors": surfaces.colors,
             "surfaces": surfaces.files, "rays": drawing.rays, "dvr": drawing.volumes, "kmeans": codebooks.kmeans,
-            "everyday": everyday.everyday, "readme": readme.shown}
+            "everyday": everyday.everyday, "kernels": kernels.kernels, "readme": readme.shown}
 
 
 def machine():
@@ -81,7 +82,7 @@ def main():
             tail += "\n\nLeft out, not there: " + "; ".join(options.left_out)
         print(tail, file=file)
         print(tail)
-    if options.results:
+    if options.results and not options.inputs:
         merge_fixed(options.results, rows)
 
 
