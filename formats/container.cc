@@ -6,6 +6,7 @@
 #include <algorithm>
 #include <cmath>
 #include <cstring>
+#include <mutex>
 
 #include "formats/little_endian.h"
 
@@ -33,7 +34,26 @@ std::string describe(const ChunkEntry& e) {
   return fmt::format("chunk {} {}.{}", letters(e.kind), e.index, e.part);
 }
 
+constexpr uint64_t most_expanded = uint64_t{1} << 40;
+/// Readers load whole words: in a file the table follows every chunk, here these bytes do.
+constexpr uint64_t behind_expanded = 64;
+
 }  // namespace
+
+struct Container::Expanded {
+  std::once_flag once;
+  Status status;
+  std::unique_ptr<std::byte[]> bytes;
+  Reservation reservation;
+};
+
+Container::Container() = default;
+Container::~Container() = default;
+
+ContainerWriter::ContainerWriter(ByteSink sink, Codec codec, int zstd, MemoryBudget& memory)
+    : sink_(std::move(sink)), codec_(codec) {
+  if (zstd > 0) packer_ = std::make_unique<ChunkPacker>(zstd, memory);
+}
 
 Status ContainerWriter::write(std::span<const std::byte> bytes) {
   position_ += bytes.size();
@@ -48,7 +68,7 @@ Status ContainerWriter::pad() {
 Status ContainerWriter::begin() {
   std::array<std::byte, block_size> header{};
   std::memcpy(header.data(), container_magic.data(), container_magic.size());
-  store_le(&header[8], container_version);
+  store_le<uint16_t>(&header[8], packer_ ? 2 : 1);
   store_le(&header[10], static_cast<uint16_t>(codec_));
   store_le(&header[56], checksum(std::span(header).first(56)));
   return write(header);
@@ -56,8 +76,13 @@ Status ContainerWriter::begin() {
 
 Status ContainerWriter::add(uint32_t kind, uint32_t index, uint64_t part, std::span<const std::byte> bytes) {
   if (position_ == 0) VOX_CHECK(begin());
-  table_.push_back({kind, index, part, position_, bytes.size(), checksum(bytes)});
-  VOX_CHECK(write(bytes));
+  std::span<const std::byte> stored = bytes;
+  if (packer_) {
+    VOX_TRY(const auto packed, packer_->pack(bytes));
+    if (!packed.empty()) stored = packed;
+  }
+  table_.push_back({kind, index, part, position_, bytes.size(), stored.size(), checksum(stored)});
+  VOX_CHECK(write(stored));
   return pad();
 }
 
@@ -71,8 +96,9 @@ Status ContainerWriter::finish() {
     store_le(p + 4, e.index);
     store_le(p + 8, e.part);
     store_le(p + 16, e.offset);
-    store_le(p + 24, e.length);
+    store_le(p + 24, e.stored);
     store_le(p + 32, e.checksum);
+    if (e.compressed()) store_le(p + 40, e.length);
   }
   std::array<std::byte, block_size> trailer{};
   std::memcpy(trailer.data(), trailer_magic.data(), trailer_magic.size());
@@ -91,7 +117,8 @@ bool is_container(std::span<const std::byte> bytes) {
 }
 
 Result<std::shared_ptr<const Container>> Container::open(std::span<const std::byte> bytes, std::string name,
-                                                         std::shared_ptr<const void> keep_alive) {
+                                                         std::shared_ptr<const void> keep_alive,
+                                                         MemoryBudget* memory) {
   auto bad = [&](const std::string& what) { return bad_input(name, what); };
   if (!is_container(bytes))
     return bad("header, byte 0: not a voxkit container: expected 89 56 4F 58 0D 0A 1A 0A");
@@ -102,8 +129,9 @@ Result<std::shared_ptr<const Container>> Container::open(std::span<const std::by
   if (load_le<uint64_t>(header + 56) != checksum(bytes.first(56)))
     return bad("header, byte 56: the checksum of the header does not match");
   const auto version = load_le<uint16_t>(header + 8);
-  if (version != container_version)
-    return bad(fmt::format("header, byte 8: container version {}: expected {}", version, container_version));
+  if (version < 1 || version > container_version)
+    return bad(
+        fmt::format("header, byte 8: container version {}: expected 1 to {}", version, container_version));
   const auto codec = load_le<uint16_t>(header + 10);
   if (codec < static_cast<uint16_t>(Codec::svmm) || codec > static_cast<uint16_t>(Codec::color))
     return bad(fmt::format("header, byte 10: unknown codec {}", codec));
@@ -133,6 +161,7 @@ Result<std::shared_ptr<const Container>> Container::open(std::span<const std::by
   container->table_.resize(count);
   uint64_t end =
       block_size;  // chunks ascend and do not overlap, so their sizes add up to no more than the file
+  bool any_compressed = false;
   for (size_t i = 0; i < count; ++i) {
     const std::byte* p = table.data() + i * entry_size;
     ChunkEntry& e = container->table_[i];
@@ -140,32 +169,71 @@ Result<std::shared_ptr<const Container>> Container::open(std::span<const std::by
     e.index = load_le<uint32_t>(p + 4);
     e.part = load_le<uint64_t>(p + 8);
     e.offset = load_le<uint64_t>(p + 16);
-    e.length = load_le<uint64_t>(p + 24);
+    e.stored = e.length = load_le<uint64_t>(p + 24);
     e.checksum = load_le<uint64_t>(p + 32);
     if (e.offset % block_size != 0 || e.offset < end || e.offset > table_offset ||
-        e.length > table_offset - e.offset)
+        e.stored > table_offset - e.offset)
       return bad(fmt::format("table, byte {}: {} of {} bytes at byte {} overlaps or leaves the file",
-                             table_offset + i * entry_size, describe(e), e.length, e.offset));
-    end = e.offset + e.length;
+                             table_offset + i * entry_size, describe(e), e.stored, e.offset));
+    end = e.offset + e.stored;
+    if (const auto plain = load_le<uint64_t>(p + 40); version > 1 && plain != 0) {
+      if (plain <= e.stored || plain > most_expanded)
+        return bad(fmt::format(
+            "table, byte {}: {} of {} bytes, {} compressed: expected more than that, and at most 2^40",
+            table_offset + i * entry_size + 40, describe(e), plain, e.stored));
+      e.length = plain;
+      any_compressed = true;
+    }
   }
   container->bytes_ = bytes;
   container->name_ = std::move(name);
   container->keep_alive_ = std::move(keep_alive);
   container->codec_ = static_cast<Codec>(codec);
   container->verified_ = std::make_unique<std::atomic<bool>[]>(count);
+  container->memory_ = memory;
+  if (any_compressed) container->expanded_ = std::make_unique<Expanded[]>(count);
   return container;
 }
 
 Result<std::span<const std::byte>> Container::chunk(size_t i) const {
   const ChunkEntry& e = table_[i];
-  const auto bytes = bytes_.subspan(e.offset, e.length);
+  const auto bytes = bytes_.subspan(e.offset, e.stored);
   if (!verified_[i].load(std::memory_order_acquire)) {
     if (checksum(bytes) != e.checksum)
       return bad_input(name_, fmt::format("{}, byte {}: the checksum does not match: the file is damaged",
                                           describe(e), e.offset));
     if (!verified_[i].exchange(true, std::memory_order_release)) ++touched_;
   }
+  if (e.compressed()) return expanded(i, bytes);
   return bytes;
+}
+
+Result<std::span<const std::byte>> Container::expanded(size_t i, std::span<const std::byte> stored) const {
+  const ChunkEntry& e = table_[i];
+  Expanded& own = expanded_[i];
+  std::call_once(own.once, [&] {
+    own.status = [&]() -> Status {
+      const uint64_t room = e.length + behind_expanded;
+      if (memory_ != nullptr) {
+        own.reservation = Reservation(*memory_);
+        if (Status reserved = own.reservation.add(room, "a chunk that was compressed"); !reserved) {
+          reserved.error().file = name_;
+          return reserved;
+        }
+      }
+      own.bytes.reset(new (std::nothrow) std::byte[room]);
+      if (own.bytes == nullptr)
+        return fail(ErrorCode::limit, name_, fmt::format("{}: no memory for {} bytes", describe(e), room));
+      if (!unpack_chunk(stored, {own.bytes.get(), e.length}))
+        return bad_input(
+            name_, fmt::format("{}, byte {}: not a zstd frame of {} bytes", describe(e), e.offset, e.length));
+      std::fill_n(own.bytes.get() + e.length, behind_expanded, std::byte{0});
+      return {};
+    }();
+    if (!own.status) own.bytes.reset();
+  });
+  if (!own.status) return tl::unexpected<Error>(own.status.error());
+  return std::span<const std::byte>(own.bytes.get(), e.length);
 }
 
 Result<std::span<const std::byte>> Container::only_chunk(uint32_t kind) const {

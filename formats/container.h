@@ -11,6 +11,7 @@
 #include <string>
 #include <vector>
 
+#include "formats/chunk_zstd.h"
 #include "formats/context.h"
 #include "formats/result.h"
 #include "formats/volume.h"
@@ -18,7 +19,8 @@
 namespace voxkit {
 
 inline constexpr std::array<uint8_t, 8> container_magic = {0x89, 'V', 'O', 'X', '\r', '\n', 0x1A, '\n'};
-inline constexpr uint16_t container_version = 1;
+/// 2: chunks may be compressed; 1: none is.
+inline constexpr uint16_t container_version = 2;
 
 enum class Codec : uint16_t { svmm = 1, vq = 2, color = 3 };
 
@@ -35,8 +37,11 @@ struct ChunkEntry {
   uint32_t kind = 0;
   uint32_t index = 0;  ///< a level, say
   uint64_t part = 0;   ///< running number within (kind, index)
-  uint64_t offset = 0, length = 0;
-  uint64_t checksum = 0;  ///< XXH64, seed 0, of the chunk's bytes
+  uint64_t offset = 0;
+  uint64_t length = 0;    ///< of the chunk, in bytes
+  uint64_t stored = 0;    ///< bytes that it takes in the file: fewer than `length` if it is compressed
+  uint64_t checksum = 0;  ///< XXH64, seed 0, of the stored bytes
+  bool compressed() const { return stored != length; }
 };
 
 /// Where a writer's bytes go, in order.
@@ -46,6 +51,8 @@ using ByteSink = std::function<Status(std::span<const std::byte>)>;
 class ContainerWriter {
  public:
   ContainerWriter(ByteSink sink, Codec codec) : sink_(std::move(sink)), codec_(codec) {}
+  /// Chunks are compressed with zstd where that is worth it; `zstd`: its level, 0: none is.
+  ContainerWriter(ByteSink sink, Codec codec, int zstd, MemoryBudget& memory);
   Status add(uint32_t kind, uint32_t index, uint64_t part, std::span<const std::byte> bytes);
   /// Writes the table and the trailer. Nothing may follow.
   Status finish();
@@ -60,21 +67,27 @@ class ContainerWriter {
   Codec codec_;
   uint64_t position_ = 0;
   std::vector<ChunkEntry> table_;
+  std::unique_ptr<ChunkPacker> packer_;
 };
 
 /// A container in memory (mapped, as a rule). Safe on any bytes: opening validates header, trailer and table
-/// against the bytes that are there; a chunk's checksum is verified when the chunk is first asked for.
+/// against the bytes that are there; a chunk's checksum is verified, and the chunk expanded if it is compressed, when it is
+/// first asked for.
 class Container {
  public:
-  /// `keep_alive` owns `bytes`. `name` is for messages.
+  /// `keep_alive` owns `bytes`. `name` is for messages. Expanded chunks are counted in `memory`, which outlives the container; 
+  /// without one they are not.
   static Result<std::shared_ptr<const Container>> open(std::span<const std::byte> bytes, std::string name,
-                                                       std::shared_ptr<const void> keep_alive);
+                                                       std::shared_ptr<const void> keep_alive,
+                                                       MemoryBudget* memory = nullptr);
+  ~Container();
   Codec codec() const { return codec_; }
   const std::string& name() const { return name_; }
   uint64_t file_bytes() const { return bytes_.size(); }
   /// In file order.
   const std::vector<ChunkEntry>& table() const { return table_; }
-  /// The bytes of the i-th chunk, or ErrorCode::input if they do not match their checksum. Thread-safe.
+  /// The bytes of the i-th chunk: in the file, or expanded. ErrorCode::input if they do not match their checksum or cannot be
+  /// expanded to their length, ErrorCode::limit if there is no memory for that. Some bytes behind them may be read. Thread-safe.
   Result<std::span<const std::byte>> chunk(size_t i) const;
   /// The bytes of the only chunk of this kind; ErrorCode::input if there is none, or more than one.
   Result<std::span<const std::byte>> only_chunk(uint32_t kind) const;
@@ -82,13 +95,19 @@ class Container {
   uint64_t chunks_touched() const { return touched_; }
 
  private:
-  Container() = default;
+  struct Expanded;
+
+  Container();
+  Result<std::span<const std::byte>> expanded(size_t i, std::span<const std::byte> stored) const;
+
   std::span<const std::byte> bytes_;
   std::string name_;
   std::shared_ptr<const void> keep_alive_;
   Codec codec_{};
   std::vector<ChunkEntry> table_;
   mutable std::unique_ptr<std::atomic<bool>[]> verified_;
+  MemoryBudget* memory_ = nullptr;
+  std::unique_ptr<Expanded[]> expanded_;  ///< by chunk, if any is compressed
   mutable std::atomic<uint64_t> touched_{0};
 };
 

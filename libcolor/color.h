@@ -66,6 +66,7 @@ struct Options {
   Colors colors = Colors::leaf;
   Counts counts = Counts::node;
   Curve curve = Curve::morton;  ///< in which order voxels have their colours
+  int zstd = 0;                 ///< level of zstd for the file's chunks, 1 to 19; 0: as they are
 };
 
 /// The blocks of what is encoded with these options.

@@ -163,7 +163,7 @@ Result<Report> encode(SurfaceSource& source, const Options& options, const Store
   const int height = height_of(info.dims);
   if (info.format != VoxelFormat::rgba32 || height > most_levels || !checked_voxels(info.dims))
     return fail(ErrorCode::internal, {}, "not the extents of a surface");
-  ContainerWriter container(sink, Codec::color);
+  ContainerWriter container(sink, Codec::color, options.zstd, *ctx.memory);
   VOX_CHECK(container.add(volume_info_kind, 0, 0, pack_volume_info(info)));
 
   ColorWriter colors(options, stored, container, ctx);

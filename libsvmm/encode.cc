@@ -127,7 +127,7 @@ class Encoder {
         params_(params),
         criterion_(params, F),
         ctx_(ctx),
-        container_(sink, Codec::svmm),
+        container_(sink, Codec::svmm, params.zstd, *ctx.memory),
         levels_(plan_levels(info_, params)),
         reservation_(*ctx.memory) {
     if (levels_.size() == 1) params_.base = Base::raw;

@@ -20,7 +20,7 @@ class Writer {
         quantiser_(quantiser),
         codes_(collected.codes),
         numbers_(collected.numbers),
-        container_(sink, Codec::vq),
+        container_(sink, Codec::vq, options.zstd, *ctx.memory),
         reservation_(*ctx.memory) {}
 
   Result<Report> write(Report report) {

@@ -48,6 +48,7 @@ struct Options {
   uint64_t codewords = 0, reduce = 0;
   Seeding seeding = Seeding::furthest;
   uint32_t max_iterations = ~uint32_t{0};  ///< of k-means; more only while clusters would be empty
+  int zstd = 0;                            ///< level of zstd for the file's chunks, 1 to 19; 0: as they are
   /// FLOAT32: least and greatest stored value, as from `measure_range`.
   ValueRange range;
   /// Told before k-means begins, and then of the PSNR so far (of peak `full_scale`), after seeding and after

@@ -77,6 +77,7 @@ void declare(CommandLine& line, Options& o) {
             "Of a .dagc file: take the colours from the images that vox-decode --tiles wrote of it, such as "
             "tile-%04d.png; where codec and ending agree they are stored as they are",
             o.tiles);
+  declare_zstd(line, o.encoder.zstd);
   line.flag(
       "--verify",
       "Decode and compare before the output appears; exit 1 if the promised bound, or what encoding found "

@@ -23,6 +23,7 @@ struct Options {
   std::optional<double> quality, delta;
   std::string base = "raw", layout = "plain", bound, alpha_weight;
   std::optional<ValueRange> range;
+  int zstd = 0;
   bool verify = false;
 };
 
@@ -54,6 +55,7 @@ void declare(CommandLine& line, Options& o) {
               one_of(o.alpha_weight, {"on", "off"}));
   declare_range_option(line, o.range,
                        "Sample values of 16 bit and float volumes that are full scale (default: measured)");
+  declare_zstd(line, o.zstd);
   line.flag("--verify",
             "Decode and compare before the output appears; exit 1 if the promised bound is broken", o.verify);
   declare_input_options(line, o.open);
@@ -73,6 +75,7 @@ Result<svmm::Params> params_of(const Options& o, VoxelFormat format) {
     for (const int64_t w : o.blockwidths) params.blockwidths.push_back(static_cast<int>(w));
   }
   params.rootwidth = o.rootwidth;
+  params.zstd = o.zstd;
   if (o.quality && o.delta) return bad_usage("--quality and --delta: expected one of them");
   params.quality = o.delta ? -1 : o.quality.value_or(90);
   params.delta = o.delta ? *o.delta : delta_of_quality(params.quality, format, params.layout);

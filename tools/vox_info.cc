@@ -93,7 +93,8 @@ Json json_of(const Options& o, const Run& run, const Input& input, std::optional
     for (const ChunkEntry& entry : container->table()) {
       Json chunk = Json::object();
       chunk.set("kind", letters(entry.kind)).set("index", entry.index).set("part", entry.part);
-      chunk.set("offset", entry.offset).set("length", entry.length);
+      chunk.set("offset", entry.offset).set("length", entry.stored);
+      if (entry.compressed()) chunk.set("plain_length", entry.length);
       chunk.set("checksum", fmt::format("{:016x}", entry.checksum));
       chunks.push(std::move(chunk));
     }
@@ -106,6 +107,19 @@ Json json_of(const Options& o, const Run& run, const Input& input, std::optional
   if (input.color) add_sizes(input.color->params(), json);
   if (o.check) json.set("checked", true);
   return json;
+}
+
+/// A line of chunks that are compressed; nothing if there are none.
+std::string compression_text(const Container& container) {
+  uint64_t chunks = 0, stored = 0, plain = 0;
+  for (const ChunkEntry& entry : container.table()) {
+    chunks += entry.compressed();
+    stored += entry.stored;
+    plain += entry.length;
+  }
+  if (chunks == 0) return {};
+  return fmt::format("zstd        {} of {} chunks, {} bytes of {}\n", chunks, container.table().size(),
+                     stored, plain);
 }
 
 std::string text_of(const Options& o, const Input& input, std::optional<uint64_t> bytes) {
@@ -123,6 +137,7 @@ std::string text_of(const Options& o, const Input& input, std::optional<uint64_t
     text += fmt::format("file bytes  {} ({:.4g} %, {:.4g} bits a voxel)\n", *bytes,
                         100 * static_cast<double>(*bytes) / static_cast<double>(raw_bytes(info)),
                         8 * static_cast<double>(*bytes) / static_cast<double>(*checked_voxels(info.dims)));
+  if (const Container* container = container_of(input)) text += compression_text(*container);
   if (input.svmm) {
     const svmm::Params& p = input.svmm->params();
     text += fmt::format(

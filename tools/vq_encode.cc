@@ -23,6 +23,7 @@ struct Options {
   uint64_t codewords = 0, reduce = 0;
   std::string seeding;
   std::optional<uint32_t> max_iterations;
+  int zstd = 0;
   bool verify = false;
 };
 
@@ -48,6 +49,7 @@ void declare(CommandLine& line, Options& o) {
   line.option("--offsets", "MAP",
               "What places say: direct: addresses; indirect: numbers; auto: the smaller (auto)",
               one_of(o.offsets, {"auto", "direct", "indirect"}));
+  declare_zstd(line, o.zstd);
   line.flag("--verify",
             "Decode and compare before the output appears; exit 1 if the promised bound is broken", o.verify);
   declare_input_options(line, o.open);
@@ -63,6 +65,7 @@ Result<vq::Options> encoder_options(const Options& o) {
   options.max_error = o.max_error;
   options.codewords = o.codewords;
   options.reduce = o.reduce;
+  options.zstd = o.zstd;
   options.seeding = o.seeding == "d2" ? vq::Seeding::d2 : vq::Seeding::furthest;
   if (o.max_iterations) options.max_iterations = *o.max_iterations;
   if (o.codebook == "packed") options.codebook = vq::Codebook::packed;

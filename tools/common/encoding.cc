@@ -5,8 +5,10 @@
 #include <cstdio>
 #include <utility>
 
+#include "formats/chunk_zstd.h"
 #include "formats/input_stream.h"
 #include "formats/output_file.h"
+#include "tools/common/parse.h"
 
 namespace voxkit::cli {
 
@@ -21,6 +23,13 @@ Result<std::unique_ptr<VolumeSource>> Inputs::open(bool wanted_again) {
   }
   VOX_TRY(Input input, open_spooled(spooled_, ctx_));
   return std::move(input.source);
+}
+
+void declare_zstd(CommandLine& line, int& level) {
+  line.option("--zstd", "LEVEL",
+              "Compress the parts of the file with zstd as well, 1 (fast) to 19 (small); a part is expanded "
+              "in memory when it is first used (not)",
+              integer(level, 1, most_zstd_level));
 }
 
 Status check_encoding(const std::string& input, const std::string& output, bool verify, const Run& run) {

@@ -29,6 +29,9 @@ class Inputs {
 /// The checks of an encoder before any work: of its output, alone and beside the input and its options.
 Status check_encoding(const std::string& input, const std::string& output, bool verify, const Run& run);
 
+/// The option --zstd: a level, 0 where it is not given.
+void declare_zstd(CommandLine& line, int& level);
+
 /// What was encoded.
 struct Encoding {
   std::string input, output;

@@ -16,10 +16,10 @@ namespace {
 
 namespace fs = std::filesystem;
 
-Result<std::shared_ptr<const Container>> container_of(std::shared_ptr<const MappedFile> file) {
+Result<std::shared_ptr<const Container>> container_of(std::shared_ptr<const MappedFile> file, Context& ctx) {
   const auto bytes = file->bytes();
   const std::string name = file->name();
-  return Container::open(bytes, name, std::move(file));
+  return Container::open(bytes, name, std::move(file), ctx.memory);
 }
 
 Result<Input> open_codec(std::shared_ptr<const Container> container, int level, Context& ctx) {
@@ -88,24 +88,24 @@ bool is_compressed(const std::string& name) {
   return has_ending(name, ".svmm") || has_ending(name, ".vqv") || has_ending(name, ".dagc");
 }
 
-Result<std::shared_ptr<const Container>> open_container(const std::string& name) {
+Result<std::shared_ptr<const Container>> open_container(const std::string& name, Context& ctx) {
   if (name != "-") {
     VOX_TRY(auto file, MappedFile::open(name));
-    return container_of(std::move(file));
+    return container_of(std::move(file), ctx);
   }
   VOX_TRY(Peeked peeked, peek_standard_input());
   VOX_TRY(auto file, MappedFile::spool(*peeked.stream));
-  return container_of(std::move(file));
+  return container_of(std::move(file), ctx);
 }
 
 Result<Input> open_compressed(const std::string& name, int level, Context& ctx) {
-  VOX_TRY(auto container, open_container(name));
+  VOX_TRY(auto container, open_container(name, ctx));
   return open_codec(std::move(container), level, ctx);
 }
 
 Result<Input> open_spooled(std::shared_ptr<const MappedFile> file, Context& ctx) {
   if (is_container(file->bytes())) {
-    VOX_TRY(auto container, container_of(std::move(file)));
+    VOX_TRY(auto container, container_of(std::move(file), ctx));
     return open_codec(std::move(container), 0, ctx);
   }
   Input input;

@@ -31,7 +31,7 @@ Result<Input> open_spooled(std::shared_ptr<const MappedFile> file, Context& ctx)
 /// Opens a compressed volume only. `level`: of the mip-map, as the voxels of the source.
 Result<Input> open_compressed(const std::string& name, int level, Context& ctx);
 /// The container in a file or on standard input.
-Result<std::shared_ptr<const Container>> open_container(const std::string& name);
+Result<std::shared_ptr<const Container>> open_container(const std::string& name, Context& ctx);
 
 /// True for names that end like a compressed volume.
 bool is_compressed(const std::string& name);
