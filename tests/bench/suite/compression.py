@@ -17,8 +17,8 @@ def lossless_methods(volume):
     """All that is lossless for a volume's type; the first one is what ratios are of."""
     found = [peers.ours(volume, "vq-encode"), peers.ours(volume, "vq-encode", "--codebook", "packed")] \
         if volume.whole_numbers else []
-    found.append(peers.ours(volume, "svmm-encode", "-q", 100))
-    if volume.type != "rgba8":
+    found += [peers.ours(volume, "svmm-encode", "-q", 100), peers.ours(volume, "svmm-encode", "-q", 100, "--zstd", 9)]
+    if volume.type != "rgba8" and peers.has_numpy():
         found.append(peers.openvdb(volume))
     found += peers.installed(("zstd", lambda: peers.zstd(volume, 3)), ("zstd", lambda: peers.zstd(volume, 19)),
                              ("xz", lambda: peers.xz(volume)))

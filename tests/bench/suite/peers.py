@@ -8,6 +8,7 @@ import pathlib
 import shutil
 import sys
 from ctypes.util import find_library
+from importlib.util import find_spec
 
 from process import run
 
@@ -33,7 +34,14 @@ def missing():
     """Peers that are not installed, with the package of Debian that has them."""
     programs = {"zstd": "zstd", "xz": "xz-utils", "zfp": "zfp", "teem-unu": "teem-apps"}
     gone = [f"{program} ({package})" for program, package in programs.items() if not shutil.which(program)]
-    return gone + ([] if find_library("blosc") else ["blosc (libblosc1)"])
+    if not find_library("blosc"):
+        gone.append("blosc (libblosc1)")
+    return gone + ([] if has_numpy() else ["NumPy (python3-numpy), and so OpenVDB and zfp"])
+
+
+def has_numpy():
+    """Whether samples.py can be run."""
+    return find_spec("numpy") is not None
 
 
 def ours(volume, encoder, *words):
@@ -87,4 +95,4 @@ def zfp(volume, setting, *words):
 
 def installed(*methods):
     """Those whose programs are there: pairs of a program's name and a function that makes the method."""
-    return [make() for program, make in methods if program is None or shutil.which(program)]
+    return [make() for program, make in methods if shutil.which(program) and (program != "zfp" or has_numpy())]

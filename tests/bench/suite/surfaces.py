@@ -82,7 +82,9 @@ def files(options, table, add):
         folder.mkdir(parents=True, exist_ok=True)
         raw = pack(options, name, source, folder)
         said = json.loads(run(options.bin / "dagcolor-pack", raw, "-o", folder / "vws.dagc", "-f", "--json").output)
-        found = [("dagcolor-pack", "vws, e=9.56", folder / "vws.dagc"), ("dagcolor-pack", "raw", raw)]
+        run(options.bin / "dagcolor-pack", raw, "-o", folder / "zstd.dagc", "-f", "-q", "--zstd", 19)
+        found = [("dagcolor-pack", "vws, e=9.56", folder / "vws.dagc"), ("dagcolor-pack", "vws, e=9.56, zstd 19", folder / "zstd.dagc"),
+                 ("dagcolor-pack", "raw", raw)]
         for what, ending in (("OpenVDB", "vdb"), ("PLY points", "ply")):
             path = folder / f"points.{ending}"
             run(options.bin / "vox-decode", raw, "-o", path, "-f", "-q")
