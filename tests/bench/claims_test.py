@@ -23,20 +23,34 @@ def row_of(rows, *key):
 
 # Words, and where each of their figures comes from: section, data, what, setting; column; unit.
 FIGURES = [
-    (r"RGBA, ([\d.]+) % of its size", [((PICTURES, "menger:5", "svmm-encode", "--quality 80 --base bitmap --blockwidth 4"), "percent", 1)]),
-    (r"density, a CT scan, ([\d.]+) %", [((PICTURES, "engine.nii.gz", "svmm-encode", "--quality 96"), "percent", 1)]),
-    (r"fog of an OpenVDB file, ([\d.]+) %", [((PICTURES, "smoke.vdb", "svmm-encode", "--quality 99.7"), "percent", 1)]),
-    (r"surface of a mesh, ([\d.]+) million voxels, colours ([\d.]+) %",
+    (r"a CT scan, lossless in ([\d.]+) %", [((PICTURES, "bonsai.nii.gz", "vq-encode", ""), "percent", 1)]),
+    (r"a volume of colours in ([\d.]+) %", [((PICTURES, "menger:5", "svmm-encode", "--quality 80 --base bitmap --blockwidth 4"), "percent", 1)]),
+    (r"a mesh as ([\d.]+) million voxels, their colours in ([\d.]+) %",
      [((PICTURES, "LeePerrySmith.obj", "dagcolor-pack", "--resolution 2048"), "voxels", MILLION),
       ((PICTURES, "LeePerrySmith.obj", "dagcolor-pack", "--resolution 2048"), "percent", 1)]),
-    (r"\| ([\d.]+) million voxels, ([\d.]+) % \| a voxel model, ([\d.]+) million voxels, ([\d.]+) %",
+    (r"no voxel off by more than (\d+) of 255: ([\d.]+) %",
+     [((PICTURES, "ch2better.nii.gz", "vq-encode", "--max-error 2 --verify"), column, 1) for column in ("max_error", "percent")]),
+    (r"Fog of an OpenVDB file: ([\d.]+) %", [((PICTURES, "smoke.vdb", "svmm-encode", "--quality 99.7"), "percent", 1)]),
+    (r"A mesh with textures as ([\d.]+) million voxels, colours ([\d.]+) %",
      [((PICTURES, "scene.gltf", "dagcolor-pack", "--resolution 2048"), "voxels", MILLION),
-      ((PICTURES, "scene.gltf", "dagcolor-pack", "--resolution 2048"), "percent", 1),
-      ((PICTURES, "scene_store8.vox", "dagcolor-pack", ""), "voxels", MILLION),
+      ((PICTURES, "scene.gltf", "dagcolor-pack", "--resolution 2048"), "percent", 1)]),
+    (r"A MagicaVoxel model, ([\d.]+) million voxels, colours ([\d.]+) %",
+     [((PICTURES, "scene_store8.vox", "dagcolor-pack", ""), "voxels", MILLION),
       ((PICTURES, "scene_store8.vox", "dagcolor-pack", ""), "percent", 1)]),
-    (r"`terrain:4096`, ([\d.]+) million voxels, colours ([\d.]+) %",
+    (r"`terrain:4096`: ([\d.]+) million voxels, colours ([\d.]+) %",
      [((PICTURES, "terrain:4096", "dagcolor-pack", ""), "voxels", MILLION),
       ((PICTURES, "terrain:4096", "dagcolor-pack", ""), "percent", 1)]),
+    (r"an eighth of its resolution, in ([\d.]+) % together",
+     [((PICTURES, "engine.nii.gz", "svmm-encode", "--quality 96 --blockwidth 2 --rootwidth 16"), "percent", 1)]),
+    (r"`svmm-encode --quality 94` \(([\d.]+) %, ([\d.]+) dB\); `vq-encode --max-error 4` \(([\d.]+) %, ([\d.]+) dB\); "
+     r"`vq-encode --reduce 64` \(([\d.]+) %, ([\d.]+) dB\)",
+     [((PICTURES, "bonsai.nii.gz", what, setting), column, 1) for what, setting in (
+         ("svmm-encode", "--quality 94 --verify"), ("vq-encode", "--max-error 4 --verify"), ("vq-encode", "--reduce 64 --verify"))
+      for column in ("percent", "psnr_db")]),
+    (r"`vws`, the default \(([\d.]+) %, ([\d.]+)\); `bc1` \(([\d.]+) %, ([\d.]+)\)\. Below: `vws` with a threshold of 25\.5 \(([\d.]+) %, ([\d.]+)\); "
+     r"`jpeg`, quality 75 \(([\d.]+) %, ([\d.]+)\); `jp2`, quality 40 \(([\d.]+) %, ([\d.]+)\)",
+     [((PICTURES, "terrain:1024", "dagcolor-pack", f"--codec {setting}"), column, 1) for setting in (
+         "vws", "bc1", "vws --threshold 25.5", "jpeg --quality 75", "jp2 --quality 40") for column in ("percent", "grmse")]),
     (r"at (\d+), (\d+) and (\d+) %, at (\d+), (\d+) and (\d+) %, and at (\d+), (\d+) and\s+(\d+) %",
      [((PICTURES, data, what, setting), "percent", 1) for data, what, settings in (
          ("menger:5", "svmm-encode", ("-q 100", "-q 90", "-q 80 -b bitmap -w 4")),

@@ -6,6 +6,7 @@ import json
 import re
 import shlex
 
+from data import BRAIN
 from process import run
 from table import Row
 
@@ -13,8 +14,9 @@ ENCODERS = ("svmm-encode", "vq-encode", "dagcolor-pack")
 
 
 def picture_commands(source):
-    """Encoder, input and options of every picture that scripts/README.md lists."""
-    for line in (source / "scripts" / "README.md").read_text(encoding="utf-8").splitlines():
+    """Encoder, input and options of every picture of gallery/ that scripts/README.md lists."""
+    text = (source / "scripts" / "README.md").read_text(encoding="utf-8")
+    for line in text.partition("`gallery/`")[2].splitlines():
         words = line.split()
         if line.startswith("    ") and words[0] in ENCODERS and words[2] == "-o":
             yield words[0], words[1], words[4:]
@@ -31,9 +33,11 @@ def demo_commands(source):
 
 
 def find(options, name):
-    """A built-in volume, or a file of the folder of data by its name; None if it is not there."""
+    """A built-in volume, a package's, or a file of the folder of data by its name; None if it is not there."""
     if ":" in name:
         return name
+    if name == BRAIN.name and BRAIN.exists():
+        return BRAIN
     return next(iter(sorted(options.data.rglob(name))), None) if options.data else None
 
 
@@ -50,6 +54,8 @@ def shown(options, table, add):
         fixed = {"bytes": said["file_bytes"], "percent": said.get("color_percent", said.get("percent"))}
         if "leaf_voxels" in said:
             fixed |= {"voxels": said["leaf_voxels"], "bits_per_voxel": said["color_bits_per_voxel"], "grmse": said["grmse"]}
+        if "psnr_db" in said:  # --verify
+            fixed |= {"psnr_db": said["psnr_db"], "max_error": said["max_abs_error"]}
         row = Row("readme", name, encoder, " ".join(words), fixed)
         add(row, [name, encoder, row.setting, said["file_bytes"], f"{said['percent']:.4g}" if "voxels" not in fixed else "",
                   f"{said['color_percent']:.4g}" if "voxels" in fixed else "", fixed.get("voxels", "")])
