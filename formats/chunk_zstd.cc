@@ -33,9 +33,13 @@ Result<std::span<const std::byte>> ChunkPacker::pack(std::span<const std::byte> 
   return std::span<const std::byte>(packed_).first(size <= chunk.size() - chunk.size() / 16 ? size : 0);
 }
 
+uint64_t unpacked_size(std::span<const std::byte> packed) {
+  const unsigned long long size = ZSTD_getFrameContentSize(packed.data(), packed.size());
+  return size == ZSTD_CONTENTSIZE_UNKNOWN || size == ZSTD_CONTENTSIZE_ERROR ? 0 : size;
+}
+
 bool unpack_chunk(std::span<const std::byte> packed, std::span<std::byte> chunk) {
-  return ZSTD_getFrameContentSize(packed.data(), packed.size()) == chunk.size() &&
-         ZSTD_decompress(chunk.data(), chunk.size(), packed.data(), packed.size()) == chunk.size();
+  return ZSTD_decompress(chunk.data(), chunk.size(), packed.data(), packed.size()) == chunk.size();
 }
 
 }  // namespace voxkit

@@ -11,6 +11,8 @@
 namespace voxkit {
 
 inline constexpr int most_zstd_level = 19;
+/// No frame has so many bytes for each of its own: a block has 2^17 at most, and takes 4 at least.
+inline constexpr uint64_t most_zstd_ratio = uint64_t{1} << 15;
 
 /// Compresses chunks one after the other.
 class ChunkPacker {
@@ -33,6 +35,8 @@ class ChunkPacker {
   uint64_t work_bytes_ = 0;
 };
 
+/// The length that a frame gives its content; 0 if it is none, or gives none.
+uint64_t unpacked_size(std::span<const std::byte> packed);
 /// Expands a frame that `pack` made; false unless it is one, of exactly as many bytes as there is room for.
 bool unpack_chunk(std::span<const std::byte> packed, std::span<std::byte> chunk);
 

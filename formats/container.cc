@@ -34,7 +34,6 @@ std::string describe(const ChunkEntry& e) {
   return fmt::format("chunk {} {}.{}", letters(e.kind), e.index, e.part);
 }
 
-constexpr uint64_t most_expanded = uint64_t{1} << 40;
 /// Readers load whole words: in a file the table follows every chunk, here these bytes do.
 constexpr uint64_t behind_expanded = 64;
 
@@ -177,10 +176,11 @@ Result<std::shared_ptr<const Container>> Container::open(std::span<const std::by
                              table_offset + i * entry_size, describe(e), e.stored, e.offset));
     end = e.offset + e.stored;
     if (const auto plain = load_le<uint64_t>(p + 40); version > 1 && plain != 0) {
-      if (plain <= e.stored || plain > most_expanded)
-        return bad(fmt::format(
-            "table, byte {}: {} of {} bytes, {} compressed: expected more than that, and at most 2^40",
-            table_offset + i * entry_size + 40, describe(e), plain, e.stored));
+      if (plain <= e.stored || plain / most_zstd_ratio >= e.stored)
+        return bad(
+            fmt::format("table, byte {}: {} of {} bytes, {} compressed: expected more than that, and less "
+                        "than {} times as many",
+                        table_offset + i * entry_size + 40, describe(e), plain, e.stored, most_zstd_ratio));
       e.length = plain;
       any_compressed = true;
     }
@@ -213,6 +213,11 @@ Result<std::span<const std::byte>> Container::expanded(size_t i, std::span<const
   Expanded& own = expanded_[i];
   std::call_once(own.once, [&] {
     own.status = [&]() -> Status {
+      const auto not_a_frame = [&] {
+        return bad_input(
+            name_, fmt::format("{}, byte {}: not a zstd frame of {} bytes", describe(e), e.offset, e.length));
+      };
+      if (unpacked_size(stored) != e.length) return not_a_frame();
       const uint64_t room = e.length + behind_expanded;
       if (memory_ != nullptr) {
         own.reservation = Reservation(*memory_);
@@ -224,9 +229,7 @@ Result<std::span<const std::byte>> Container::expanded(size_t i, std::span<const
       own.bytes.reset(new (std::nothrow) std::byte[room]);
       if (own.bytes == nullptr)
         return fail(ErrorCode::limit, name_, fmt::format("{}: no memory for {} bytes", describe(e), room));
-      if (!unpack_chunk(stored, {own.bytes.get(), e.length}))
-        return bad_input(
-            name_, fmt::format("{}, byte {}: not a zstd frame of {} bytes", describe(e), e.offset, e.length));
+      if (!unpack_chunk(stored, {own.bytes.get(), e.length})) return not_a_frame();
       std::fill_n(own.bytes.get() + e.length, behind_expanded, std::byte{0});
       return {};
     }();

@@ -103,13 +103,13 @@ TEST(ChunkZstd, ManyThreadsGetTheSameBytes) {
 TEST(ChunkZstd, LengthsThatAreNotThoseOfTheFrameAreRefused) {
   const Bytes file = file_of(3);
   const uint64_t stored = open(file).value()->table()[0].stored;
-  // Nothing to expand; more than any chunk has.
-  for (const uint64_t length : {uint64_t{1}, stored, (uint64_t{1} << 40) + 1, ~uint64_t{0}}) {
+  // Nothing to expand; more than any frame holds.
+  for (const uint64_t length : {uint64_t{1}, stored, stored << 15, ~uint64_t{0}}) {
     const auto container = open(with_length(file, length));
     ASSERT_FALSE(container) << length;
     EXPECT_EQ(container.error().code, ErrorCode::input);
   }
-  for (const uint64_t length : {uint64_t{flat} - 1, uint64_t{flat} + 1, stored + 1}) {
+  for (const uint64_t length : {uint64_t{flat} - 1, uint64_t{flat} + 1, stored + 1, (stored << 15) - 1}) {
     const auto container = open(with_length(file, length));
     ASSERT_TRUE(container) << length;
     for (int again = 0; again < 2; ++again) {
