@@ -19,6 +19,7 @@ import everyday
 import kernels
 import peers
 import readme
+import scaling
 import surfaces
 from process import Failed, run
 from table import FIXED, MEASURED, Markdown, merge_fixed, write_csv
@@ -26,7 +27,8 @@ from table import FIXED, MEASURED, Markdown, merge_fixed, write_csv
 OF_INPUTS = ["lossless", "bounded", "small", "colors", "surfaces"]
 SECTIONS = {"lossless": compression.lossless, "bounded": compression.bounded, "small": compression.small, "colors": surfaces.colors,
             "surfaces": surfaces.files, "rays": drawing.rays, "dvr": drawing.volumes, "kmeans": codebooks.kmeans,
-            "everyday": everyday.everyday, "kernels": kernels.kernels, "readme": readme.shown}
+            "everyday": everyday.everyday, "kernels": kernels.kernels, "readme": readme.shown,
+            "scaling": scaling.scaling}
 
 
 def machine():

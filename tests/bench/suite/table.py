@@ -68,11 +68,14 @@ def merge_fixed(path, rows):
 
 
 class Markdown:
-    """A section's table, a line at a time."""
+    """A section's table, a line at a time; without columns the note is all of it."""
 
     def __init__(self, title, note, columns, file):
         self.columns, self.file = columns, file
-        self.print(f"\n## {title}\n\n{note}\n\n| " + " | ".join(columns) + " |")
+        self.print(f"\n## {title}\n\n{note}")
+        if not columns:
+            return
+        self.print("\n| " + " | ".join(columns) + " |")
         self.print("| " + " | ".join("---" if i < 3 else "---:" for i in range(len(columns))) + " |")
 
     def print(self, line):
