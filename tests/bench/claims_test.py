@@ -63,6 +63,15 @@ def bits(rows, section, what, setting):
     return float(row_of(rows, section, "skull", what, setting)["bits_per_voxel"])
 
 
+def smaller_for_scans(rows):
+    """vq-encode's files of the scans beside svmm-encode's, lossless and with the same bound."""
+    def size(section, data, what, known):
+        return min(int(row["bytes"]) for (s, d, w, setting), row in rows.items() if (s, d, w) == (section, data, what) and known in setting)
+    return all(size("lossless", data, "vq-encode", "") < size("lossless", data, "svmm-encode", "") and
+               size("bounded", data, "vq-encode", "--max-error") < size("bounded", data, "svmm-encode", "--delta")
+               for data in ("skull", "ch2better"))
+
+
 def smaller(rows):
     """Bits a voxel of the CT, from svmm-encode's lossless file to that of k-means."""
     svmm, vq = bits(rows, "lossless", "svmm-encode", "-q 100"), bits(rows, "lossless", "vq-encode", "")
@@ -71,6 +80,7 @@ def smaller(rows):
 
 CONDITIONS = [
     (r"it makes scans much smaller than `svmm-encode`; `--max-error` makes them smaller still, and k-means,", smaller),
+    (r"the smaller one for scans, without loss or within a bound", smaller_for_scans),
 ]
 
 
