@@ -439,6 +439,9 @@ Result<std::vector<Level>> encode_as(VolumeSource& source, const Params& params,
 Result<std::vector<Level>> encode(VolumeSource& source, const Params& params, const ByteSink& sink,
                                   Context& ctx) {
   VOX_CHECK(validate(params, source.info()));
+  if (const auto voxels = checked_voxels(source.info().dims); !voxels || *voxels > most_voxels)
+    return fail(ErrorCode::limit, {},
+                "the volume has more than 2^48 voxels, whose averages would not be exact");
   switch (source.info().format) {
     case VoxelFormat::rgba32:
       return encode_as<VoxelFormat::rgba32>(source, params, sink, ctx);

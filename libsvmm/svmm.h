@@ -46,6 +46,8 @@ enum class Bound : uint8_t {
 
 /// Largest block width: 2^10.
 inline constexpr int max_blockwidth = 1024;
+/// Most voxels of a volume that is encoded: up to there 64 bits hold the sums that averages are made of.
+inline constexpr uint64_t most_voxels = uint64_t{1} << 48;
 /// Every level halves a side of at most 2^31, down to 1, rounded up to even.
 inline constexpr int max_levels = 33;
 
@@ -85,7 +87,8 @@ uint64_t thesis_bytes(std::span<const Level> levels);
 
 /// Compresses `source` into a container written to `sink`, in one pass over the source. Memory: a few slabs
 /// of max(32, 2 w_0) slices if the source is forward only, else a few tiles of that width; plus a slab of
-/// each higher level. The bytes written do not depend on ctx.threads. Returns the levels.
+/// each higher level. The bytes written do not depend on ctx.threads. Returns the levels. ErrorCode::limit:
+/// more than `most_voxels`, or than ctx.memory allows.
 Result<std::vector<Level>> encode(VolumeSource& source, const Params& params, const ByteSink& sink,
                                   Context& ctx);
 

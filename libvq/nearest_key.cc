@@ -89,7 +89,7 @@ Key KeySpace::key(const Brick& brick) const {
 
 int32_t KeySpace::reach(uint64_t squared_distance) const {
   if (squared_distance == 0) return 0;
-  const double furthest = 64.0 * 4095 * 4095;  // with scale 1: nothing is further apart
+  const double furthest = 64.0 * 4096 * 4096;  // scaled voxels are below 4096: nothing is further apart
   const double distance =
       std::sqrt(std::min(static_cast<double>(squared_distance) * scale_ * scale_, furthest)) * (1 + 1e-9) +
       rounding;

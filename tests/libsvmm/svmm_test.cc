@@ -168,6 +168,19 @@ TEST(Svmm, ThesisLayoutHasThePublishedSizes) {
   }
 }
 
+TEST(Svmm, AVolumeWhoseSumsWouldOverflowIsRefused) {
+  VolumeInfo info;
+  info.format = VoxelFormat::rgba32;
+  info.dims = {1 << 17, 1 << 16, 1 << 16};
+  voxkit::test::FlatSource source(info, Voxel::of(~uint32_t{0}));
+  Context ctx = test::context();
+  const auto levels = encode(
+      source, {}, [](std::span<const std::byte>) { return Status{}; }, ctx);
+  ASSERT_FALSE(levels);
+  EXPECT_EQ(levels.error().code, ErrorCode::limit);
+  EXPECT_NE(levels.error().what.find("2^48"), std::string::npos) << levels.error().what;
+}
+
 TEST(Svmm, ParametersThatDoNotGoTogetherAreRefused) {
   const auto refused = [](Params params, VoxelFormat f, const char* word) {
     const auto status = validate(params, make_info({64, 64, 64}, f));

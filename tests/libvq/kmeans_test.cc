@@ -209,6 +209,24 @@ TEST(KMeans, NoMoreCentresThanDifferentBricks) {
   }
 }
 
+TEST(KMeans, BricksAsFarApartAsCanBe) {
+  // Black and white at full range, and what lies one grey level from these.
+  std::vector<Brick> bricks(6);
+  bricks[0].fill(65535);
+  bricks[1].fill(65534);
+  bricks[2].fill(0);
+  bricks[3].fill(1);
+  bricks[4].fill(65535);
+  bricks[4][7] = 65534;
+  bricks[5].fill(32768);
+  const std::vector<uint64_t> weights = {1, 7, 1, uint64_t{1} << 31, 3, 1};
+  for (const Seeding seeding : {Seeding::furthest, Seeding::d2})
+    for (const uint32_t k : {1u, 2u, 3u, 5u})
+      for (const uint32_t iterations : {0u, 1u, ~0u})
+        expect_equal(bricks, weights, {.codewords = k, .seeding = seeding, .max_iterations = iterations},
+                     "k " + std::to_string(k));
+}
+
 TEST(KMeans, SumsAtTheExtremes) {
   // 2^47 in weights, voxels of 0 and 65535: the largest sums and errors that there are.
   std::vector<Brick> bricks(4, Brick{});

@@ -381,6 +381,26 @@ TEST(Vq, FloatsThatAreNotNumbers) {
   EXPECT_LT(encoded.report.quantisation_error, 3.0 / 131070);
 }
 
+TEST(Vq, FloatsUpToTheGreatestStayNumbers) {
+  constexpr float most = std::numeric_limits<float>::max();
+  const VolumeInfo info = scalar_info({4, 4, 4}, SampleType::f32);
+  for (const float least : {0.15f, -most, 3e38f})
+    for (const double steps : {1.5, 2.75, 1000.25, 65000.3}) {
+      std::vector<float> values(64, least);
+      for (size_t i = 0; i < values.size(); i += 2) values[i] = most - static_cast<float>(i) * 1e36f;
+      values[5] = most;
+      Options options;
+      options.range = {least, most};
+      for (const float v : values) options.range.lo = std::min<double>(options.range.lo, v);
+      options.max_error = (options.range.hi - options.range.lo) / 2 / steps + std::ldexp(most, -23);
+      const Encoded encoded = encode_to_memory(info, voxkit::test::bytes_of(values), options);
+      const auto decoded = floats(decode_all(*encoded.open()));
+      for (size_t i = 0; i < values.size(); ++i)
+        EXPECT_LE(std::abs(static_cast<double>(values[i]) - decoded[i]), *options.max_error)
+            << values[i] << ' ' << decoded[i] << ' ' << steps;
+    }
+}
+
 TEST(Vq, WhatIsRefused) {
   const auto code = [](const Options& options, const VolumeInfo& info) {
     const Status status = validate(options, info);
