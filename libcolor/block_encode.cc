@@ -96,12 +96,23 @@ class PartWriter {
   size_t macro_blocks_ = 0;
 };
 
+uint64_t cost_of(const std::vector<PlannedBlock>& plan, Endpoints endpoints) {
+  uint64_t cost = 0;
+  for (const PlannedBlock& block : plan) cost += block_cost(block.last - block.first, block.bits, endpoints);
+  return cost;
+}
+
 std::vector<PlannedBlock> plan_of(const MacroColors& colors, const Fitter& fitter, Endpoints endpoints,
-                                  const BlockOptions& options) {
+                                  uint32_t allowed, const BlockOptions& options) {
   if (options.weight_bits > 0)
     return merge_greedily(colors, fitter, endpoints, options.weight_bits, options.weight_bits);
-  if (options.effort > 1) return parse_optimally(colors, fitter, endpoints, options.effort);
-  return merge_greedily(colors, fitter, endpoints, 0, most_weight_bits);
+  if (options.effort == 1) return merge_greedily(colors, fitter, endpoints, 0, most_weight_bits);
+  std::vector<PlannedBlock> plan = parse_optimally(colors, fitter, endpoints, options.effort);
+  if (options.effort < greedy_too) return plan;
+  // Not all ends of blocks are tried: now and then what greedy merging finds is less.
+  const Fitter plain(colors, endpoints, allowed, 1);
+  std::vector<PlannedBlock> greedy = merge_greedily(colors, plain, endpoints, 0, most_weight_bits);
+  return cost_of(greedy, endpoints) < cost_of(plan, endpoints) ? greedy : plan;
 }
 
 /// The greatest squared distance, in the unit of a Fit.
@@ -131,11 +142,8 @@ EncodedPart encode_part(std::span<const Rgb> colors, const BlockOptions& options
     const auto own = colors.subspan(first, std::min<size_t>(macro_block_colors, colors.size() - first));
     const MacroColors macro(own, options.space);
     const Fitter fitter(macro, endpoints, allowed, options.effort);
-    const std::vector<PlannedBlock> plan = plan_of(macro, fitter, endpoints, options);
-    uint64_t cost = 0;
-    for (const PlannedBlock& block : plan)
-      cost += block_cost(block.last - block.first, block.bits, endpoints);
-    if (cost >= 24 * own.size())
+    const std::vector<PlannedBlock> plan = plan_of(macro, fitter, endpoints, allowed, options);
+    if (cost_of(plan, endpoints) >= 24 * own.size())
       writer.add_raw(own);
     else
       writer.add(macro, fitter, plan);

@@ -17,6 +17,9 @@ struct BlockOptions {
   ErrorSpace space = ErrorSpace::rgb;
 };
 
+/// From this effort on no macro block is larger than with effort 1.
+inline constexpr int greedy_too = 4;
+
 /// Endpoints with which any colour can be coded within a threshold: 5 and 6 bits are off by up to 6.1, in
 /// CIELAB by up to 5.3.
 Endpoints endpoints_for(double threshold, ErrorSpace space = ErrorSpace::rgb);

@@ -75,6 +75,21 @@ uint64_t cheapest_cut(const MacroColors& colors, const Fitter& fitter, Endpoints
   return best;
 }
 
+TEST(Blocks, FromEffort4OnNothingIsLargerThanGreedyMerging) {
+  // Nearly on a line, found by search (tests/stress): trying few ends of blocks misses what greedy merging
+  // finds.
+  std::vector<Rgb> colors;
+  for (const uint32_t c : {0x010002, 0x040607, 0x070b11, 0x0b121b, 0x0c1823, 0x101e2c, 0x152536, 0x152a3f,
+                           0x183048, 0x1b3651, 0x1e3b5a, 0x1f4163, 0x22486b, 0x274f75, 0x2e547e, 0x2e5987,
+                           0x338c96, 0x005dbf, 0x386e9f, 0x3972aa, 0x3c79b5, 0x4a7ebe, 0xdaa5f7, 0x443b5f})
+    colors.push_back({static_cast<uint8_t>(c >> 16), static_cast<uint8_t>(c >> 8), static_cast<uint8_t>(c)});
+  const auto bytes = [&](int effort) {
+    return encode_part(colors, {1, 0, effort, ErrorSpace::lab}).bytes.size();
+  };
+  EXPECT_GT(bytes(2), bytes(1));  // else this is no example
+  for (int effort = greedy_too; effort <= 9; ++effort) EXPECT_LE(bytes(effort), bytes(1)) << effort;
+}
+
 TEST(Blocks, ParsingIsCloseToTheBestCut) {
   uint64_t best = 0, found = 0, greedy = 0;
   for (uint64_t seed = 10; seed < 20; ++seed)
