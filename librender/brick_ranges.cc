@@ -35,9 +35,10 @@ class RowRanges {
   }
   void add(const std::byte* row) {
     const T* const values = reinterpret_cast<const T*>(row);  // aligned: rows of one type, from its start
+    constexpr T least = std::numeric_limits<T>::lowest(), most = std::numeric_limits<T>::max();
     for (size_t x = 0; x < lo_.size(); ++x) {
-      lo_[x] = values[x] < lo_[x] ? values[x] : lo_[x];
-      hi_[x] = values[x] > hi_[x] ? values[x] : hi_[x];
+      lo_[x] = values[x] < lo_[x] && values[x] >= least ? values[x] : lo_[x];
+      hi_[x] = values[x] > hi_[x] && values[x] <= most ? values[x] : hi_[x];
     }
   }
   Range of(int64_t brick) const {
@@ -188,9 +189,7 @@ ValueRange BrickRanges::all() const {
   Range range = nothing;
   for (int64_t i = 0; i < bricks_.x * bricks_.y * bricks_.z; ++i) range = merged(range, ranges_[i]);
   if (!(range.lo <= range.hi)) return {0, 0};
-  constexpr float most = std::numeric_limits<float>::max();
-  return {static_cast<double>(std::clamp(range.lo, -most, most)),
-          static_cast<double>(std::clamp(range.hi, -most, most))};
+  return {static_cast<double>(range.lo), static_cast<double>(range.hi)};
 }
 
 Result<BrickSkips> BrickSkips::create(const BrickRanges& ranges, const TransferFunction& transfer,

@@ -15,11 +15,12 @@ namespace voxkit::render {
 /// the voxels one further on.
 inline constexpr int dvr_brick_log2 = 2, dvr_brick = 1 << dvr_brick_log2;
 
-/// The least and the greatest value that samples in each brick can have. NaN counts as nothing.
+/// The least and the greatest value that samples in each brick can have. NaN and infinities count as nothing:
+/// all samples beside one are void.
 class BrickRanges {
  public:
   struct Range {
-    float lo, hi;  ///< lo > hi: nothing but NaN
+    float lo, hi;  ///< lo > hi: nothing but NaN and infinities
   };
   /// One pass over all voxels.
   static Result<BrickRanges> of(const DenseGrid& grid, Context& ctx);
@@ -32,7 +33,7 @@ class BrickRanges {
   const Range& operator()(int64_t x, int64_t y, int64_t z) const {
     return ranges_[(z * bricks_.y + y) * bricks_.x + x];
   }
-  /// Of all voxels; 0..0 where there are none but NaN.
+  /// Of all voxels; 0..0 where there are none but NaN and infinities.
   ValueRange all() const;
 
  private:

@@ -35,6 +35,11 @@ Result<DvrParams> dvr_params(const VolumeInfo& info, const Camera& camera, const
   if (2 * glm::length(transform.half) / step > 0x1p23)
     return bad_usage("a ray would take more than 2^23 samples: expected larger steps");
   const glm::dvec3 light = light_of(rays);
+  // Gradients in a unit near the width of the transfer function, a power of two, which rounds nothing: so
+  // that their squares are neither too large nor too small for floats.
+  const double unit = std::ldexp(1.0, -std::min(std::ilogb(transfer.span()), 126)),
+               span = transfer.span() * unit;
+  const bool from_neighbours = options.gradient == Gradient::neighbour;
   const int64_t longest = std::max({info.dims.x, info.dims.y, info.dims.z});
   DvrParams params{
       .cast = cast,
@@ -44,11 +49,12 @@ Result<DvrParams> dvr_params(const VolumeInfo& info, const Camera& camera, const
       .margin = static_cast<float>(longest) * 0x1p-19f,
       .shortest = static_cast<float>(longest) * 0x1p-16f,
       .edge = {},
+      .unit = static_cast<float>(unit),
       .voxel = {},
       .light = {},
-      .flat = transfer.span() * 1e-5f,
+      .flat = static_cast<float>(span) * 1e-5f,
       .lit = options.lit,
-      .modulate = static_cast<float>(options.modulate / static_cast<double>(transfer.span())),
+      .modulate = static_cast<float>(options.modulate / span),
       .table = transfer.table(),
       .first = transfer.first(),
       .scale = transfer.scale(),
@@ -57,7 +63,7 @@ Result<DvrParams> dvr_params(const VolumeInfo& info, const Camera& camera, const
       .slice = static_cast<int32_t>(skips.slice()),
   };
   for (int a = 0; a < 3; ++a) {
-    params.edge[a] = static_cast<float>(edge / transform.voxel[a]);
+    params.edge[a] = static_cast<float>(edge / transform.voxel[a] * (from_neighbours ? 1 : unit));
     params.voxel[a] = transform.voxel[a];
     params.light[a] = static_cast<float>(light[a]);
   }

@@ -83,8 +83,8 @@ VOX_HD_HOT Interpolated<Real> interpolate(const Real (&v)[8], const Vec<Real>& a
 
 /// The gradient from three samples elsewhere, each off by a way and a difference of values: solves
 /// way . gradient = difference. `accepted`: whether no way is shorter than `shortest`, below which the
-/// rounding of places would show, and the ways are far enough from lying in a plane; then the gradient means
-/// something.
+/// rounding of places would show, the ways are far enough from lying in a plane, and nothing has become too
+/// large for a float; then the gradient means something.
 template <class Real>
 struct Solved {
   Vec<Real> gradient;
@@ -104,7 +104,10 @@ VOX_HD_HOT Solved<Real> solve_gradient(const Vec<Real> (&way)[3], const Real (&d
   const auto part = [&](const Real& a, const Real& b, const Real& c) {
     return (a * difference[0] + (b * difference[1] + c * difference[2])) * inverse;
   };
-  return {{part(c12.x, c20.x, c01.x), part(c12.y, c20.y, c01.y), part(c12.z, c20.z, c01.z)}, accepted};
+  const Vec<Real> gradient = {part(c12.x, c20.x, c01.x), part(c12.y, c20.y, c01.y),
+                              part(c12.z, c20.z, c01.z)};
+  const Real sum = (gradient.x + gradient.y) + gradient.z;
+  return {gradient, accepted & (sum - sum == 0.0f)};
 }
 
 /// Blinn-Phong: what a colour is multiplied by, and what is added to it.

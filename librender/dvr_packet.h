@@ -13,15 +13,17 @@ namespace voxkit::render {
 /// What all rays of a picture share. Sample k of any ray is at depth (k + middle) * step.
 struct DvrParams {
   CastParams cast;
-  double step;      ///< depth from sample to sample, world units
-  double middle;    ///< sample 0, about where the volume is
-  float length;     ///< the same step in smallest voxel edges, along the camera's axis
-  float margin;     ///< more than a sample's place is off by rounding, in voxels
-  float shortest;   ///< way to a sample beside from which a gradient can be had in spite of that
-  float edge[3];    ///< smallest edge of a voxel by its edge along each axis
+  double step;     ///< depth from sample to sample, world units
+  double middle;   ///< sample 0, about where the volume is
+  float length;    ///< the same step in smallest voxel edges, along the camera's axis
+  float margin;    ///< more than a sample's place is off by rounding, in voxels
+  float shortest;  ///< way to a sample beside from which a gradient can be had in spite of that
+  float edge[3];  ///< smallest edge of a voxel by its edge along each axis, times the unit of gradients where
+                  ///< these do not
+  float unit;     ///< of gradients, where these come from neighbours
   double voxel[3];  ///< edges of a voxel in the world
   float light[3];   ///< unit vector towards the light, world
-  float flat;       ///< gradients of less than this are none, values an edge
+  float flat;       ///< gradients of less than this are none, units an edge
   bool lit;         ///< not with DvrGradient::none
   float modulate;   ///< opacity is multiplied by this times the gradient's length, up to 1; 0: it is not
   const TransferFunction::Entry* table;
@@ -170,9 +172,11 @@ struct DvrSamples {
 };
 
 /// Replaces gradients by those from neighbouring rays, and the other depth, where these determine one that is
-/// not against that of the cell: a normal is never turned round.
+/// not against that of the cell: a normal is never turned round. All gradients are times `unit` then, a power
+/// of two.
 template <class Lanes>
-VOX_HD_HOT void use_neighbours(float shortest, DvrSamples<Lanes>& sample, const DvrSamples<Lanes>& other) {
+VOX_HD_HOT void use_neighbours(float shortest, float unit, DvrSamples<Lanes>& sample,
+                               const DvrSamples<Lanes>& other) {
   using Real = typename Lanes::Real;
   const Vec<Real>& at = sample.place.clamped;
   const Real& value = sample.here.value;
@@ -180,9 +184,11 @@ VOX_HD_HOT void use_neighbours(float shortest, DvrSamples<Lanes>& sample, const 
   const auto below = [](const auto& x) { return Lanes::below(x); };
   const Vec<Real> way[3] = {Vec<Real>{beside(at.x), beside(at.y), beside(at.z)} - at,
                             Vec<Real>{below(at.x), below(at.y), below(at.z)} - at, other.place.clamped - at};
-  const Real difference[3] = {beside(value) - value, below(value) - value, other.here.value - value};
+  const Real difference[3] = {(beside(value) - value) * unit, (below(value) - value) * unit,
+                              (other.here.value - value) * unit};
   const Solved<Real> solved = solve_gradient<Lanes>(way, difference, shortest);
   Vec<Real>& gradient = sample.here.gradient;
+  gradient = {gradient.x * unit, gradient.y * unit, gradient.z * unit};
   const typename Lanes::Mask accepted = solved.accepted & (dot(solved.gradient, gradient) > 0.0f) &
                                         beside(sample.inside) & below(sample.inside) & sample.inside &
                                         other.inside;
@@ -202,7 +208,7 @@ VOX_HD_HOT void blend_samples(const DvrParams& params, const DvrRays<Lanes>& ray
   const Real& value = sample.here.value;
   const Real entry = Lanes::least(Lanes::greatest((value - params.first) * params.scale, Lanes::all(0.0f)),
                                   Lanes::all(last));
-  const Mask wanted = sample.taken & (value == value);
+  const Mask wanted = sample.taken & (value - value == 0.0f);  // not NaN, nor infinite
   const Int at = Lanes::to_int(entry) << 2;
   const float* const table = params.table->rgb;
   Real density = Lanes::gather(table + 3, at, wanted);
@@ -305,8 +311,8 @@ VOX_HD_HOT void march(const DvrParams& params, Sampler& sampler, int x, int y, D
     }
     if constexpr (depths > 1) {
       const DvrSamples<Lanes> first = samples[0];
-      use_neighbours<Lanes>(params.shortest, samples[0], samples[1]);
-      use_neighbours<Lanes>(params.shortest, samples[1], first);
+      use_neighbours<Lanes>(params.shortest, params.unit, samples[0], samples[1]);
+      use_neighbours<Lanes>(params.shortest, params.unit, samples[1], first);
     }
     awaited = alive;
     for (int i = 0; i < depths; ++i) {

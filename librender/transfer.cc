@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <limits>
 
 #include "librender/opacity.h"
 
@@ -55,11 +56,14 @@ float density_of(double opacity) {
 TransferFunction::TransferFunction(std::vector<TransferPoint> points)
     : points_(std::move(points)), table_(entries), seen_(entries + 1) {
   const double first = points_.front().value, last = points_.back().value;
-  const double width = std::max(last - first, std::max(std::abs(first), 1.0) * 1e-6);
+  // At least what the rounding of floats leaves of it, and a scale that is a number.
+  const double magnitude = std::max(std::abs(first), std::abs(last));
+  const double width = std::max({last - first, magnitude > 0 ? magnitude * 1e-6 : 1e-6, 1e-34});
   // Beyond the first and the last point the table has half a step of each.
-  first_ = static_cast<float>(first - width * (0.5 / (entries - 1)));
+  constexpr double most = std::numeric_limits<float>::max();
+  first_ = static_cast<float>(std::clamp(first - width * (0.5 / (entries - 1)), -most, most));
   scale_ = static_cast<float>((entries - 1) / width);
-  span_ = static_cast<float>(width);
+  span_ = static_cast<float>(std::min(width, most));
   for (int i = 0; i < entries; ++i) {
     const auto rgba = (*this)(first + width * i / (entries - 1));
     Entry& entry = table_[static_cast<size_t>(i)];

@@ -42,7 +42,8 @@ class TransferFunction {
   float first() const { return first_; }
   float scale() const { return scale_; }
   const Entry* table() const { return table_.data(); }
-  /// How far apart first and last point are; at least a tiny bit.
+  /// How far apart first and last point are; at least a millionth of the greater one, and 1e-34. Values that
+  /// are further than the greatest float from the first one look like the last.
   float span() const { return span_; }
   /// Whether any value from lo to hi, rounding included, may have an opacity that is not 0. NaN: false.
   bool shows(float lo, float hi) const;

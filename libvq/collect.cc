@@ -22,7 +22,7 @@ struct Run {
     uint64_t hash;
   };
   std::vector<Found> bricks;  ///< block after block, in each in order
-  double error = 0;
+  Loss loss;
 };
 
 class Collector {
@@ -102,11 +102,11 @@ class Collector {
     run.blocks = std::min(run_blocks, blocks_.x - first.x);
     run.bricks.clear();
     run.uniform.reset();
-    run.error = 0;
+    run.loss = {};
     const Box box = voxels_of(first, run.blocks);
     if (!source_.forward_only()) {
       if (const auto value = source_.uniform(box)) {
-        quantiser_.codes(value->bytes.data(), 1, &run.uniform.emplace(), run.error);
+        quantiser_.codes(value->bytes.data(), 1, &run.uniform.emplace(), run.loss);
         return {};
       }
     }
@@ -129,7 +129,7 @@ class Collector {
     for (int64_t z = 0; z < whole.z; ++z)
       for (int64_t y = 0; y < whole.y; ++y) {
         uint16_t* const row = &codes[static_cast<size_t>((z * whole.y + y) * whole.x)];
-        quantiser_.codes(in.row(std::min(y, size.y - 1), std::min(z, size.z - 1)), size.x, row, run.error);
+        quantiser_.codes(in.row(std::min(y, size.y - 1), std::min(z, size.z - 1)), size.x, row, run.loss);
         std::fill(row + size.x, row + whole.x, row[size.x - 1]);
       }
     for (int64_t b = 0; b < run.blocks; ++b) {
@@ -177,7 +177,8 @@ class Collector {
   }
 
   Status number_run(const Run& run) {
-    out_.quantisation_error = std::max(out_.quantisation_error, run.error);
+    out_.loss.greatest_error = std::max(out_.loss.greatest_error, run.loss.greatest_error);
+    out_.loss.replaced |= run.loss.replaced;
     std::optional<uint32_t> uniform;
     if (run.uniform) {
       const BrickRange range{*run.uniform, *run.uniform};

@@ -10,9 +10,9 @@ namespace voxkit::vq {
 struct Collected {
   explicit Collected(Context& ctx) : codes(ctx), reservation(*ctx.memory) {}
   UniqueCodes codes;
-  BrickNumbers numbers;           ///< into `codes`
-  double quantisation_error = 0;  ///< greatest so far, of finite samples
-  Reservation reservation;        ///< for the numbers
+  BrickNumbers numbers;  ///< into `codes`
+  Loss loss;
+  Reservation reservation;  ///< for the numbers
 };
 
 /// Cuts a volume into bricks, in one pass; those that reach over its end repeat its last voxels. Bricks are

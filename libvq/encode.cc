@@ -232,7 +232,8 @@ Result<Report> encode(VolumeSource& source, const Options& options, const ByteSi
   VOX_CHECK(collect(source, quantiser, collected, ctx));
   Report report;
   report.bricks = product(bricks_of(source.info().dims));
-  report.quantisation_error = collected.quantisation_error;
+  report.quantisation_error = collected.loss.greatest_error;
+  report.replaced = collected.loss.replaced;
   report.params.unique_bricks = collected.codes.size();
   report.params.max_error = quantiser.bound();
   VOX_CHECK(cluster(collected, options, source.info(), quantiser, report, ctx));

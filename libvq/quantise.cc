@@ -68,7 +68,7 @@ Result<Quantiser> Quantiser::make(const Options& options, const VolumeInfo& info
   return q;
 }
 
-void Quantiser::codes(const std::byte* voxels, int64_t count, uint16_t* out, double& greatest_error) const {
+void Quantiser::codes(const std::byte* voxels, int64_t count, uint16_t* out, Loss& loss) const {
   if (format_ == VoxelFormat::float32) {
     const double levels = 1 / step_;
     for (int64_t i = 0; i < count; ++i) {
@@ -79,7 +79,9 @@ void Quantiser::codes(const std::byte* voxels, int64_t count, uint16_t* out, dou
       out[i] = static_cast<uint16_t>(std::clamp(std::floor((inside - origin_) * levels + 0.5), 0.0, 65535.0));
       if (std::isfinite(value)) {
         const auto decoded = voxel_of(out[i], format_, origin_, step_).as<float>();
-        greatest_error = std::max(greatest_error, std::abs(static_cast<double>(decoded) - value));
+        loss.greatest_error = std::max(loss.greatest_error, std::abs(static_cast<double>(decoded) - value));
+      } else {
+        loss.replaced = true;
       }
     }
     return;
@@ -95,7 +97,7 @@ void Quantiser::codes(const std::byte* voxels, int64_t count, uint16_t* out, dou
     const auto value = static_cast<double>(out[i]);
     out[i] = code_of_[out[i]];
     const double decoded = std::clamp(origin_ + step_ * out[i], 0.0, most);
-    greatest_error = std::max(greatest_error, std::abs(decoded - value));
+    loss.greatest_error = std::max(loss.greatest_error, std::abs(decoded - value));
   }
 }
 

@@ -7,14 +7,20 @@
 
 namespace voxkit::vq {
 
+/// What is lost on the way.
+struct Loss {
+  double greatest_error = 0;  ///< of finite samples
+  bool replaced = false;      ///< there were samples that are no numbers, or infinite
+};
+
 /// How voxels of a volume become codes: the nearest multiple of a step from an origin.
 class Quantiser {
  public:
   /// Codes are those of `Options::max_error`. ErrorCode::usage where 16 bits do not suffice for it.
   static Result<Quantiser> make(const Options& options, const VolumeInfo& info);
 
-  /// Codes of a row of `count` voxels; `greatest_error` becomes at least that of its finite samples.
-  void codes(const std::byte* voxels, int64_t count, uint16_t* out, double& greatest_error) const;
+  /// Codes of a row of `count` voxels; `loss` becomes at least theirs.
+  void codes(const std::byte* voxels, int64_t count, uint16_t* out, Loss& loss) const;
 
   /// A code stands for origin + step * code.
   double origin() const { return origin_; }

@@ -80,6 +80,7 @@ struct Report {
   uint64_t bricks = 0;                            ///< of the volume
   std::array<uint64_t, 4> transform_codewords{};  ///< codewords by transform; constant bricks have none
   double quantisation_error = 0;  ///< greatest error so far, before k-means, of finite samples
+  bool replaced = false;          ///< there were samples that are no numbers, or infinite
   double seeding_seconds = 0, kmeans_seconds = 0;
 };
 
@@ -96,6 +97,10 @@ Result<double> error_bound(const Options& options, const VolumeInfo& info);
 /// the codebook, compressed, and 4 bytes for each brick; with k-means, what that takes for the unique bricks
 /// as well. What is written does not depend on ctx.threads.
 Result<Report> encode(VolumeSource& source, const Options& options, const ByteSink& sink, Context& ctx);
+
+/// A FLOAT32 volume as `encode` takes it, for comparing: not a number and minus infinity are range.lo, plus
+/// infinity is range.hi. `source` must outlive it.
+std::unique_ptr<VolumeSource> finite_source(VolumeSource& source, const ValueRange& range);
 
 /// A compressed volume, opened for random access. Safe on any bytes: every operation returns an error or a
 /// well-formed answer and touches only the chunks it needs. All const functions are thread-safe. For inner

@@ -141,7 +141,10 @@ Result<int> work(const Options& o, Run& run) {
       VOX_TRY(source, inputs.open(true));
     }
     VOX_TRY(const Input decoded, open_compressed(out->temporary(), 0, run.ctx));
-    VOX_TRY(encoding.diff, diff_volumes(*source, *decoded.source, std::nullopt, nullptr, run.ctx));
+    // What is no number has no error: it is compared with what it was taken for.
+    const auto finite = report.replaced ? vq::finite_source(*source, options.range) : nullptr;
+    VOX_TRY(encoding.diff,
+            diff_volumes(finite ? *finite : *source, *decoded.source, std::nullopt, nullptr, run.ctx));
     if (!keeps_promise(report.params, *encoding.diff)) {
       cli::report(
           run.tool,
@@ -154,6 +157,9 @@ Result<int> work(const Options& o, Run& run) {
   VOX_CHECK(out->commit());
   if (run.options.json) VOX_CHECK(print(json_of(encoding, run, report).text()));
   if (!run.options.quiet && !run.options.json) print_encoding(encoding);
+  if (!run.options.quiet && report.replaced)
+    fmt::print(stderr, "{}: {}: voxels that are NaN or infinite became the least or the greatest value\n",
+               run.tool, o.input);
   return 0;
 }
 

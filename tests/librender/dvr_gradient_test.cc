@@ -182,7 +182,7 @@ TEST(DvrGradient, NearSingularCasesAreNeverTurnedRoundNorNoNumbers) {
     const unsigned inside = i % 5 == 0 ? static_cast<unsigned>(random()) : ~0u;
     Packet packet = packet_of(slope, glm::dvec3(200) + any() * 40.0, way[0], way[1], way[2], inside);
     const DvrSamples<PortableLanes> before = packet.first;
-    use_neighbours<PortableLanes>(shortest, packet.first, packet.second);
+    use_neighbours<PortableLanes>(shortest, 1, packet.first, packet.second);
     for (int lane = 0; lane < 8; ++lane) {
       const auto& g = packet.first.here.gradient;
       const glm::dvec3 got(g.x[lane], g.y[lane], g.z[lane]);

@@ -357,5 +357,66 @@ TEST(Dvr, ColoursAndTooManySamplesAreRefused) {
   EXPECT_EQ(status.error().code, ErrorCode::usage);
 }
 
+std::vector<float> waves(Index3 dims) {
+  std::vector<float> values;
+  for (int64_t i = 0; i < dims.x * dims.y * dims.z; ++i)
+    values.push_back(static_cast<float>(std::lround(500 * std::sin(0.9 * static_cast<double>(i % dims.x)) +
+                                                    300 * std::cos(0.05 * static_cast<double>(i)))));
+  return values;
+}
+
+TEST(Dvr, TheUnitOfValuesDoesNotMatter) {
+  const Index3 dims(12, 11, 10);
+  const VolumeInfo info = voxkit::test::scalar_info(dims, SampleType::f32);
+  const std::vector<float> values = waves(dims);
+  for (const Gradient gradient : {Gradient::analytic, Gradient::neighbour})
+    for (const double modulate : {0.0, 3.0}) {
+      DvrOptions options = small();
+      options.gradient = gradient;
+      options.modulate = modulate;
+      std::optional<DvrFrame> plain;
+      for (const int power : {0, -110, -60, 60, 110}) {
+        std::vector<float> scaled = values;
+        for (float& v : scaled) v = std::ldexp(v, power);
+        const auto source = voxkit::test::volume(info, scaled);
+        const auto grid = dense(*source);
+        Context ctx = context();
+        const auto ranges = BrickRanges::of(*grid, ctx);
+        ASSERT_TRUE(ranges);
+        const DvrFrame frame = draw(scene_of(grid, *transfer_preset("gray", ranges->all())),
+                                    Camera::orbit(30, 20, 1.5, 40), options);
+        if (!plain) plain = frame;
+        EXPECT_GT(frame.rays_hit, 1000u) << power;
+        expect_same(frame, *plain);
+      }
+    }
+}
+
+TEST(Dvr, WhatIsNoNumberIsVoidAndChangesNothingElse) {
+  const Index3 dims(12, 11, 10);
+  const VolumeInfo info = voxkit::test::scalar_info(dims, SampleType::f32);
+  std::vector<float> values = waves(dims);
+  constexpr float inf = std::numeric_limits<float>::infinity();
+  const auto plain_source = voxkit::test::volume(info, values);
+  Context ctx = context();
+  const ValueRange range = BrickRanges::of(*dense(*plain_source), ctx)->all();
+  std::vector<DvrFrame> frames;
+  for (const float odd : {inf, -inf, std::numeric_limits<float>::quiet_NaN()}) {
+    for (size_t i = 7; i < values.size(); i += 150) values[i] = odd;
+    const auto source = voxkit::test::volume(info, values);
+    const auto grid = dense(*source);
+    EXPECT_EQ(BrickRanges::of(*grid, ctx)->all(), range);
+    for (const bool skip : {true, false}) {
+      DvrOptions options = small();
+      options.skip = skip;
+      frames.push_back(
+          draw(scene_of(grid, *transfer_preset("gray", range)), Camera::orbit(30, 20, 1.5, 40), options));
+      expect_same(frames.back(), frames.front());
+    }
+  }
+  for (const Pixel& pixel : frames.front().pixels)
+    for (const float c : pixel.colour) EXPECT_TRUE(c >= 0 && c <= 1);
+}
+
 }  // namespace
 }  // namespace voxkit::render

@@ -48,7 +48,7 @@ void integers(SampleType type, const char* name, const Effort& effort, Report& r
     options.max_error = static_cast<double>(at[0]) / 16;
     const auto quantiser = must(vq::Quantiser::make(options, info));
     int64_t worst = 0;
-    double said = 0;
+    vq::Loss said;
     for (int64_t v = 0; v < values; ++v) {
       const Voxel voxel = Voxel::of(static_cast<uint32_t>(v));
       uint16_t code = 0;
@@ -58,7 +58,7 @@ void integers(SampleType type, const char* name, const Effort& effort, Report& r
     }
     // More than the bound, then as near to it as can be.
     const double beyond = static_cast<double>(worst) - *options.max_error;
-    return said == static_cast<double>(worst) ? beyond : 1e9;
+    return said.greatest_error == static_cast<double>(worst) ? beyond : 1e9;
   });
   report.add({fmt::format("vq-encode --max-error E, {}, all values", name), "error - E at most 0",
               text(found.score), found.score <= 0, found.tried * values,
@@ -92,7 +92,6 @@ void floats(bool asked, const Effort& effort, Report& report) {
   const std::vector<Range> ranges = {
       finite_floats, finite_floats, {0, int64_t{1} << 40}, {0, 1}, {0, int64_t{1} << 58}};
   VolumeInfo info = test::scalar_info({4, 4, 4}, SampleType::f32);
-  double greatest_said = 0;
   const auto look = [&](const FloatCase& c, double* error) {
     vq::Options options;
     options.range = c.range;
@@ -100,13 +99,12 @@ void floats(bool asked, const Effort& effort, Report& report) {
     const auto quantiser = vq::Quantiser::make(options, info);
     if (!quantiser) return -1.0;  // the bound is too small
     uint16_t code = 0;
-    double said = 0;
+    vq::Loss said;
     const Voxel voxel = Voxel::of(c.value);
     quantiser->codes(voxel.bytes.data(), 1, &code, said);
     const auto decoded = vq::voxel_of(code, info.format, quantiser->origin(), quantiser->step()).as<float>();
     const Exact d = magnitude(Exact(decoded) - c.value);
     if (error != nullptr) *error = static_cast<double>(d);
-    greatest_said = std::max(greatest_said, said);
     const Exact bound = asked ? c.bound : quantiser->bound();
     // Within: how near to the bound; beyond: by how much, as a number above 1.
     return std::isfinite(decoded) ? static_cast<double>(d / bound) + (d > bound ? 1e-9 : 0) : 1e9;

@@ -15,9 +15,9 @@ inline Exact magnitude(Exact x) {
 inline double to_double(Exact x) {
   return static_cast<double>(x);
 }
-/// Of a square: the root to twice the bits of a double's.
+/// The root, to twice the bits of a double's; 0 of what is below.
 inline Exact root(Exact x) {
-  if (!(x > 0)) return 0;
+  if (!(x > 0) || x - x != 0) return x > 0 ? x : 0;
   // Newton's method, from the root of what a double can hold.
   Exact scale = 1;
   while (x > Exact(0x1p900)) x = x * 0x1p-200 * 0x1p-200, scale *= 0x1p200;
