@@ -117,7 +117,7 @@ class Block {
     for (int64_t y = y0; y < y1 + gy_.taps - 1; ++y) {
       filter_row(a.row(y) + x0, b.row(y) + x0, n, filtered_[y % gy_.taps]);
       const int64_t top = y - (gy_.taps - 1);
-      if (top >= y0) add_windows(top, n);
+      if (top >= y0) add_windows(a, b, x0, top, n);
     }
     Sums sums;
     for (int64_t i = 0; i < n; ++i) {
@@ -148,7 +148,8 @@ class Block {
     }
   }
 
-  VOXKIT_INLINE void add_windows(int64_t top, int64_t n) {
+  VOXKIT_INLINE void add_windows(const Image& image_a, const Image& image_b, int64_t left, int64_t top,
+                                 int64_t n) {
     for (int m = 0; m < moments; ++m) {
       Rows rows{};
       for (int k = 0; k < gy_.taps; ++k) rows[static_cast<size_t>(k)] = filtered_[(top + k) % gy_.taps][m];
@@ -158,11 +159,18 @@ class Block {
       using Real = decltype(real);
       const Real a = load<Real>(means_[mean_a] + i), b = load<Real>(means_[mean_b] + i);
       const Real ab = a * b, aa_bb = a * a + b * b;
-      // Where a sample is huge, rounding could break |2 covariance| <= sum of variances; a NaN passes
-      // through.
-      const Real variances = greater(Real(load<Real>(means_[squares] + i) - aa_bb), Real{});
-      const Real covariance2 =
-          lesser(greater(Real(2 * (load<Real>(means_[product] + i) - ab)), Real(-variances)), variances);
+      store(variances_ + i, greater(Real(load<Real>(means_[squares] + i) - aa_bb), Real{}));
+      store(covariances2_ + i, Real(2 * (load<Real>(means_[product] + i) - ab)));
+    });
+    bool any = false;
+    for (int64_t i = 0; i < n; ++i) any |= is_cancelled(i);
+    if (any) spread_again(image_a, image_b, left, top, n);
+    for_each_lane(n, [&](int64_t i, auto real) VOXKIT_LAMBDA {
+      using Real = decltype(real);
+      const Real a = load<Real>(means_[mean_a] + i), b = load<Real>(means_[mean_b] + i);
+      const Real ab = a * b, aa_bb = a * a + b * b, variances = load<Real>(variances_ + i);
+      // Rounding could break |2 covariance| <= sum of variances; a NaN passes through.
+      const Real covariance2 = lesser(greater(load<Real>(covariances2_ + i), Real(-variances)), variances);
       const Real contrast_structure = (covariance2 + c2_) / (variances + c2_);
       const Real luminance = (2 * ab + c1_) / (aa_bb + c1_);
       store(contrast_structure_ + i, Real(load<Real>(contrast_structure_ + i) + contrast_structure));
@@ -170,11 +178,38 @@ class Block {
     });
   }
 
+  /// Whether samples are so large beside their differences that the means of their squares say little about
+  /// these: of 53 bits less than 27 are left. Integers of 8 and 16 bits stay below.
+  VOXKIT_INLINE bool is_cancelled(int64_t i) const {
+    return means_[squares][i] > 0x1p26 * (variances_[i] + c2_);
+  }
+  /// Variances and covariances of these windows, from each one's middle sample on.
+  [[gnu::noinline]] void spread_again(const Image& a, const Image& b, int64_t left, int64_t top, int64_t n) {
+    for (int64_t w = 0; w < n; ++w) {
+      if (!is_cancelled(w) || !std::isfinite(means_[squares][w])) continue;
+      const int64_t x = left + w, mx = x + gx_.taps / 2, my = top + gy_.taps / 2;
+      const double a0 = a.row(my)[mx], b0 = b.row(my)[mx];
+      double sum_a = 0, sum_b = 0, sum_squares = 0, sum_product = 0;
+      for (int j = 0; j < gy_.taps; ++j)
+        for (int i = 0; i < gx_.taps; ++i) {
+          const double weight = gx_.weights[static_cast<size_t>(i)] * gy_.weights[static_cast<size_t>(j)];
+          const double va = a.row(top + j)[x + i] - a0, vb = b.row(top + j)[x + i] - b0;
+          sum_a += weight * va;
+          sum_b += weight * vb;
+          sum_squares += weight * (va * va + vb * vb);
+          sum_product += weight * (va * vb);
+        }
+      variances_[w] = std::max(sum_squares - (sum_a * sum_a + sum_b * sum_b), 0.0);
+      covariances2_[w] = 2 * (sum_product - sum_a * sum_b);
+    }
+  }
+
   const Gaussian &gx_, &gy_;
   double c1_, c2_;
   double moments_[moments][width + max_taps - 1];
   Row filtered_[max_taps][moments];  ///< along x; row y is at y % taps
   Row means_[moments];
+  Row variances_, covariances2_;   ///< sums of both; twice the covariance
   Row ssim_, contrast_structure_;  ///< summed along y
 };
 

@@ -270,5 +270,21 @@ TEST_F(SsimTest, LumaAndChannels) {
   EXPECT_EQ(luma(white, ctx_)->row(1)[1], 255);
 }
 
+TEST(Ssim, OfLargeConstantsIsThatOfTheirLuminance) {
+  MemoryBudget budget;
+  Context ctx;
+  ctx.memory = &budget;
+  for (const double value : {1e4, 1e8, 1e20, 1e38})
+    for (const double ratio : {1.0, 1.5, -1.0}) {
+      const auto flat = [&](double v) {
+        return picture(40, 30, 1, SampleType::f32, ctx, [&](int64_t, int64_t, int) { return v; });
+      };
+      const Image a = flat(value), b = flat(value * ratio);
+      const double va = a.row(0)[0], vb = b.row(0)[0], c1 = 0.01 * 0.01;
+      EXPECT_NEAR(ssim(a, b, std::nullopt, ctx)->ssim, (2 * va * vb + c1) / (va * va + vb * vb + c1), 1e-12)
+          << value << ' ' << ratio;
+    }
+}
+
 }  // namespace
 }  // namespace voxkit
