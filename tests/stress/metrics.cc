@@ -267,6 +267,43 @@ void sums(SampleType type, const char* name, double promised, const Effort& effo
               found.score <= promised, found.tried, input});
 }
 
+/// The same for colours: errors per channel and of the vector, alpha apart.
+void colour_sums(const Effort& effort, Report& report) {
+  const Range color{0, 0xffffffff};
+  const std::vector<Range> ranges = {{1, 4},  {1, 4}, {1, 4}, {0, 40}, {0, 40},
+                                     {0, 40}, color,  color,  color,   color};
+  const std::vector<Point> starts = {{2, 2, 2, 9, 9, 9, 0xffffffff, 0, 0, 0xffffffff},
+                                     {4, 4, 4, 1, 1, 1, 0, 0, 1, 0}};
+  Context ctx = stress_context();
+  const Worst found = climb(ranges, starts, effort.share(200), effort.seed, [&](const Point& at) {
+    const VolumeInfo info = test::colour_info({at[0] << 10, at[1] << 10, at[2] << 10}, VoxelFormat::rgba32);
+    const Box box{{500, 600, 700}, {500 + at[3], 600 + at[4], 700 + at[5]}};
+    const auto voxel = [&](size_t i) { return Voxel::of(static_cast<uint32_t>(at[i])); };
+    TwoValues a(info, box, voxel(6), voxel(7)), b(info, box, voxel(8), voxel(9));
+    const VolumeDiff is = must(diff_volumes(a, b, std::nullopt, nullptr, ctx));
+    const auto squares = [&](size_t p, size_t q, int channels) {
+      int64_t sum = 0;
+      for (int c = 0; c < channels; ++c) {
+        const int64_t d = (at[p] >> (8 * c) & 255) - (at[q] >> (8 * c) & 255);
+        sum += d * d;
+      }
+      return static_cast<Exact>(sum);
+    };
+    const auto inside = static_cast<Exact>(box.voxels()), all = static_cast<Exact>(info.box().voxels());
+    const Exact rgb = inside * squares(6, 8, 3) + (all - inside) * squares(7, 9, 3),
+                rgba = inside * squares(6, 8, 4) + (all - inside) * squares(7, 9, 4);
+    const auto off = [](double is_value, Exact expected) {
+      return expected == 0 ? std::abs(is_value) : to_double(magnitude(Exact(is_value) - expected) / expected);
+    };
+    return std::max({off(is.mse, rgba / (4 * all)), off(*is.grmse, root(rgb / (3 * all))),
+                     off(*is.grmse_distance, root(rgb / all))});
+  });
+  std::string input;
+  for (const int64_t v : found.at) input += fmt::format("{} ", v);
+  report.add({"sums of up to 2^36 voxels, RGBA: MSE, GRMSE", "relatively off by 1e-15",
+              fmt::format("{:.3g}", found.score), found.score <= 1e-15, found.tried, input});
+}
+
 /// A volume of many different floats, as its rows are added one by one.
 void float_rows(const Effort& effort, Report& report) {
   const std::vector<Range> ranges = {finite_floats, finite_floats, {1, 4096}, {0, 30}};
@@ -307,6 +344,7 @@ void fill(const Effort& effort, Report& report) {
   sums(SampleType::u8, "u8", 1e-15, effort, report);
   sums(SampleType::u16, "u16", 1e-15, effort, report);
   sums(SampleType::f32, "floats", 1e-12, effort, report);
+  colour_sums(effort, report);
   float_rows(effort, report);
 }
 

@@ -26,8 +26,9 @@ struct Worst {
 /// The point of the greatest score that is found within `tries` looks. Each climb changes one to four
 /// variables at a time: by one, by a power of two, to an end of their range, to any place in it, or to what
 /// another one is; it keeps what is not worse, and ends when nothing has helped for long. Climbs begin at
-/// each of `starts`, then at points of several kinds: anywhere, all variables equal, at ends, at any power of
-/// two, or at the worst point so far with a part of it made anew. The same on every machine.
+/// `starts`, the worst first, and in turn with these at points of several kinds: anywhere, all variables
+/// equal, at ends, at any power of two, or at the worst point so far with a part of it made anew. The same on
+/// every machine.
 template <class Score>
 Worst climb(std::span<const Range> ranges, const std::vector<Point>& starts, int64_t tries, uint64_t seed,
             const Score& score) {
@@ -45,8 +46,17 @@ Worst climb(std::span<const Range> ranges, const std::vector<Point>& starts, int
 
   Worst worst;
   const size_t n = ranges.size();
+  std::vector<std::pair<double, size_t>> ranked;  // the worst last
+  for (size_t i = 0; i < starts.size() && worst.tried < tries; ++i, ++worst.tried)
+    ranked.push_back({score(starts[i]), i});
+  std::stable_sort(ranked.begin(), ranked.end(),
+                   [](const auto& a, const auto& b) { return a.first < b.first; });
   const auto begin = [&](size_t number) -> Point {
-    if (number < starts.size()) return starts[number];
+    if (number % 2 == 0 && !ranked.empty()) {
+      const size_t start = ranked.back().second;
+      ranked.pop_back();
+      return starts[start];
+    }
     Point at(n);
     const uint64_t kind = below(worst.at.empty() ? 4 : 6);
     const size_t like = below(n);
