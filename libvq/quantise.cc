@@ -5,7 +5,6 @@
 #include <algorithm>
 #include <cmath>
 #include <cstring>
-#include <limits>
 
 #include "libvq/layout.h"
 
@@ -56,11 +55,10 @@ Result<Quantiser> Quantiser::make(const Options& options, const VolumeInfo& info
           fmt::format("--max-error {:.6g}: too small for 65536 levels of the values {:.6g} to {:.6g}: "
                       "expected {:.6g} or more",
                       *options.max_error, lo, hi, ((hi - lo) / 65534 / 2 + rounding) * (1 + 1e-9)));
-    // The code nearest to the greatest value must not stand for what no float can hold: then steps are a
-    // little smaller, and the last one ends there.
-    const double levels = (hi - lo) / q.step_;
-    if (lo + q.step_ * std::floor(levels + 0.5) > std::numeric_limits<float>::max())
-      q.step_ = (hi - lo) / std::ceil(levels);
+    // The code nearest to the greatest value may stand for more than that, which floats hold less exactly, or
+    // not at all: then steps are a little smaller, and the last one ends there.
+    const double levels = (hi - lo) / q.step_, top = lo + q.step_ * std::floor(levels + 0.5);
+    if (top > hi && std::ldexp(1.0, std::ilogb(top) - 24) > rounding) q.step_ = (hi - lo) / std::ceil(levels);
   } else {
     q.step_ = (hi - lo) / 65535;
     q.bound_ = q.step_ / 2 * (1 + 1e-12) + rounding;

@@ -381,6 +381,23 @@ TEST(Vq, FloatsThatAreNotNumbers) {
   EXPECT_LT(encoded.report.quantisation_error, 3.0 / 131070);
 }
 
+TEST(Vq, FloatsAboveTheGreatestAreRoundedFurther) {
+  // Found by search (tests/stress): what the greatest voxel is decoded to lies above it, beyond a power of
+  // two.
+  const float least = 0x1.dc3ffep+57f, most = 0x1.ffdd48p+70f;
+  std::vector<float> values(64, least);
+  values[9] = most;
+  Options options;
+  options.range = {least, most};
+  options.max_error = 0x1.ffce67ffeaa25p+70;
+  const Encoded encoded =
+      encode_to_memory(scalar_info({4, 4, 4}, SampleType::f32), voxkit::test::bytes_of(values), options);
+  const auto decoded = floats(decode_all(*encoded.open()));
+  for (size_t i = 0; i < values.size(); ++i)
+    EXPECT_LE(std::abs(static_cast<double>(values[i]) - decoded[i]), *options.max_error) << i;
+  EXPECT_LE(encoded.report.quantisation_error, *options.max_error);
+}
+
 TEST(Vq, FloatsUpToTheGreatestStayNumbers) {
   constexpr float most = std::numeric_limits<float>::max();
   const VolumeInfo info = scalar_info({4, 4, 4}, SampleType::f32);

@@ -156,7 +156,8 @@ void neighbours(const Effort& effort, Report& report) {
     for (size_t i = 0; i < 3; ++i) {
       const Exact is = w[i][0] * g[0] + w[i][1] * g[1] + w[i][2] * g[2];
       const Exact way_length = root(w[i][0] * w[i][0] + w[i][1] * w[i][1] + w[i][2] * w[i][2]);
-      const Exact scale = way_length * length + magnitude(d[i]);
+      // Renderers take differences in a unit near the width of the transfer function: 2^-100 is nothing.
+      const Exact scale = way_length * length + magnitude(d[i]) + Exact(0x1p-100);
       if (!(scale > 0)) continue;
       worst = std::max(worst, magnitude(is - d[i]) / scale);
     }
@@ -166,7 +167,7 @@ void neighbours(const Effort& effort, Report& report) {
   std::string input;
   for (const int64_t v : found.at) input += fmt::format("{}{:a}", input.empty() ? "" : " ", float_of(v));
   report.add({"gradient from neighbouring rays, where it is accepted",
-              "a difference off by 2⁻⁹ of way times gradient",
+              "a difference off by 2⁻⁹ of way times gradient, or 2⁻¹⁰⁰",
               fmt::format("{:.4g} (2^{:.1f})", found.score, std::log2(found.score)), found.score <= 0x1p-9,
               found.tried, input});
 }

@@ -343,7 +343,7 @@ void fill(const Effort& effort, Report& report) {
   odd_images(effort, report);
   sums(SampleType::u8, "u8", 1e-15, effort, report);
   sums(SampleType::u16, "u16", 1e-15, effort, report);
-  sums(SampleType::f32, "floats", 1e-12, effort, report);
+  sums(SampleType::f32, "floats", 1e-11, effort, report);
   colour_sums(effort, report);
   float_rows(effort, report);
 }
