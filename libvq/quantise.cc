@@ -5,6 +5,7 @@
 #include <algorithm>
 #include <cmath>
 #include <cstring>
+#include <limits>
 
 #include "libvq/layout.h"
 
@@ -58,7 +59,9 @@ Result<Quantiser> Quantiser::make(const Options& options, const VolumeInfo& info
     // The code nearest to the greatest value may stand for more than that, which floats hold less exactly, or
     // not at all: then steps are a little smaller, and the last one ends there.
     const double levels = (hi - lo) / q.step_, top = lo + q.step_ * std::floor(levels + 0.5);
-    if (top > hi && std::ldexp(1.0, std::ilogb(top) - 24) > rounding) q.step_ = (hi - lo) / std::ceil(levels);
+    if (top > hi &&
+        (top > std::numeric_limits<float>::max() || std::ldexp(1.0, std::ilogb(top) - 24) > rounding))
+      q.step_ = (hi - lo) / std::ceil(levels);
   } else {
     q.step_ = (hi - lo) / 65535;
     q.bound_ = q.step_ / 2 * (1 + 1e-12) + rounding;

@@ -402,7 +402,7 @@ TEST(Vq, FloatsUpToTheGreatestStayNumbers) {
   constexpr float most = std::numeric_limits<float>::max();
   const VolumeInfo info = scalar_info({4, 4, 4}, SampleType::f32);
   for (const float least : {0.15f, -most, 3e38f})
-    for (const double steps : {1.5, 2.75, 1000.25, 65000.3}) {
+    for (const double steps : {1.5, 1.50000001, 1.5000001, 2.75, 1000.25, 65000.3}) {
       std::vector<float> values(64, least);
       for (size_t i = 0; i < values.size(); i += 2) values[i] = most - static_cast<float>(i) * 1e36f;
       values[5] = most;
