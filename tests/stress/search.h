@@ -47,8 +47,11 @@ Worst climb(std::span<const Range> ranges, const std::vector<Point>& starts, int
   Worst worst;
   const size_t n = ranges.size();
   std::vector<std::pair<double, size_t>> ranked;  // the worst last
-  for (size_t i = 0; i < starts.size() && worst.tried < tries; ++i, ++worst.tried)
+  for (size_t i = 0; i < starts.size() && worst.tried < tries; ++i, ++worst.tried) {
     ranked.push_back({score(starts[i]), i});
+    if (worst.at.empty() || ranked.back().first > worst.score)
+      worst.score = ranked.back().first, worst.at = starts[i];
+  }
   std::stable_sort(ranked.begin(), ranked.end(),
                    [](const auto& a, const auto& b) { return a.first < b.first; });
   const auto begin = [&](size_t number) -> Point {
@@ -58,7 +61,7 @@ Worst climb(std::span<const Range> ranges, const std::vector<Point>& starts, int
       return starts[start];
     }
     Point at(n);
-    const uint64_t kind = below(worst.at.empty() ? 4 : 6);
+    const uint64_t kind = below(number == 0 ? 4 : 6);
     const size_t like = below(n);
     for (size_t i = 0; i < n; ++i) {
       at[i] = kind == 0 ? anywhere(i) : kind == 1 ? end(i) : kind == 2 ? spread(i) : 0;
