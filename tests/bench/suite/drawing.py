@@ -8,7 +8,7 @@ from table import Row
 
 
 def rays(options, table, add):
-    table("Rays to the first voxel", "bench_nanovdb_rays: 1280 x 720, 4 views, frame by frame in turn, one thread; percent is of RGBA; "
+    table("Rays to the first voxel", "bench_nanovdb_rays: 1280 x 720, 4 views, frame by frame in turn, one thread; "
           "*differ*: rays whose first voxel is another one. Ratios are of times, beside SVMM at quality 80: above 1 that is faster.",
           ["data", "what", "setting", "MB", "Mrays/s", "its time / ours", "differ"])
     program = options.bin / "bench_nanovdb_rays"
