@@ -3,6 +3,8 @@
 For the reference decoders beside this file. Section numbers are those of FORMAT.md.
 """
 
+import ctypes
+import ctypes.util
 import math
 import struct
 from collections import namedtuple
@@ -57,6 +59,24 @@ def xxh64(data):
     return h ^ h >> 32
 
 
+# ---- Zstandard frames, by its library --------------------------------------------------------------------------------
+
+def unzstd(frame, length):
+    """The content of a frame of `length` bytes; None unless it is one."""
+    name = ctypes.util.find_library("zstd") or "libzstd.so.1"
+    try:
+        library = ctypes.CDLL(name)
+    except OSError:
+        raise Refused("the file has compressed chunks: expected libzstd to be there") from None
+    library.ZSTD_getFrameContentSize.restype = ctypes.c_uint64
+    library.ZSTD_decompress.restype = ctypes.c_size_t
+    if library.ZSTD_getFrameContentSize(frame, ctypes.c_size_t(len(frame))) != length:
+        return None
+    out = ctypes.create_string_buffer(length)
+    size = library.ZSTD_decompress(out, ctypes.c_size_t(length), frame, ctypes.c_size_t(len(frame)))
+    return out.raw if size == length else None
+
+
 # ---- Section 1: the container ----------------------------------------------------------------------------------------
 
 Chunk = namedtuple("Chunk", "kind index part offset length checksum")
@@ -74,7 +94,7 @@ class Container:
         require(size >= 128, "file: {} bytes, shorter than a header and a trailer", size)
         self.check("header", 0, 56, self.unpack("<Q", 56)[0])
         self.version, self.codec = self.unpack("<HH", 8)
-        require(self.version == 1, "header: byte 8: container version {}, expected 1", self.version)
+        require(1 <= self.version <= 2, "header: byte 8: container version {}, expected 1 or 2", self.version)
 
         end = size - 64
         require(data[end:end + 8] == b"VOXTABLE", "trailer: byte {}: not found, the file is truncated", end)
@@ -85,7 +105,7 @@ class Container:
                 "trailer: byte {}: the chunk table does not end at the trailer", end + 8)
         self.check("chunk table", table, end - table, table_sum)
 
-        self.chunks, free = {}, 64
+        self.chunks, free, expanded = {}, 64, []
         for at in range(table, end, 64):
             chunk = Chunk(*self.unpack("<4sIQQQQ", at))
             require(chunk.offset % 64 == 0, "chunk table: byte {}: offset not a multiple of 64", at + 16)
@@ -95,7 +115,19 @@ class Container:
             if chunk.kind in KINDS:
                 require(chunk[:3] not in self.chunks, "chunk table: byte {}: chunk listed twice", at)
                 self.check("chunk " + chunk.kind.decode(), chunk.offset, chunk.length, chunk.checksum)
+                content = self.unpack("<Q", at + 40)[0]
+                if self.version == 2 and content != 0:
+                    require(chunk.length < content < chunk.length << 15, "chunk table: byte {}: {} bytes in {}", at + 40,
+                            content, chunk.length)
+                    stored = bytes(self.data[chunk.offset:free])
+                    plain = unzstd(stored, content)
+                    require(plain is not None, "chunk {}: byte {}: not a frame of {} bytes", chunk.kind.decode(), chunk.offset, content)
+                    # Behind all else, so that it is found as any other.
+                    chunk = chunk._replace(offset=size + sum(map(len, expanded)), length=content)
+                    expanded.append(plain)
                 self.chunks[chunk[:3]] = chunk
+        if expanded:
+            self.data = memoryview(b"".join([data, *expanded]))
 
     def unpack(self, layout, offset):
         return struct.unpack_from(layout, self.data, offset)

@@ -88,6 +88,7 @@ class Tools(ToolCase):
                         ("--codec", "palette"), ("--codec", "palette", "--palette", "3", "--colors", "all"),
                         ("--codec", "bc1", "--image-curve", "hilbert", "--colors", "all"),
                         ("--codec", "png"), ("--codec", "png", "--palette", "5", "--image-curve", "hilbert"), ("--codec", "png", "--palette", "200"), ("-e", "2"),
+                        ("--codec", "raw", "--zstd", "3"),
                         ("-e", "4", "--space", "lab"), ("-e", "25.5", "--effort", "1"),
                         ("--colors", "all"), ("--counts", "pointer"), ("--colors", "all", "--counts", "pointer"),
                         ("--curve", "hilbert"), ("--curve", "hilbert", "--counts", "pointer", "--colors", "all")):

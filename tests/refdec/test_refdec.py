@@ -80,7 +80,7 @@ class SmallFile(unittest.TestCase):
 
     def test_container_rules(self):
         chunks = self.chunks()
-        self.refused(container(chunks, version=2), "version 2")
+        self.refused(container(chunks, version=3), "version 3")
         self.refused(container(chunks, codec=3), "codec 3")
         for gone in range(4):
             self.refused(container(chunks[:gone] + chunks[gone + 1:]), "expected exactly one|missing")
@@ -177,6 +177,15 @@ class Tools(ToolCase):
                                    layout)
                 info = self.compare(file)
                 self.assertEqual((info["params"]["base"], info["params"]["layout"]), (base, layout))
+
+    def test_compressed_chunks(self):
+        for options in (("--quality", "100"), ("--quality", "95", "-w", "4")):
+            with self.subTest(options=options):
+                plain = os.path.getsize(self.encode("membrane:60,50,20:1", *options))
+                file = self.encode("membrane:60,50,20:1", "--zstd", "3", *options)
+                self.assertLess(os.path.getsize(file), plain)
+                self.assertEqual(Container(read(file)).version, 2)
+                self.compare(file)
 
     def test_sample_types(self):
         """All voxel formats and bases: a volume half zero, half noise; as floats some of that are NaN or huge."""

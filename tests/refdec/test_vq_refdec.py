@@ -176,7 +176,7 @@ class Tools(ToolCase):
     def test_built_ins(self):
         transforms = set()
         for source in BUILT_INS:
-            for options in LAYOUTS + (("--max-error", "3"), ("--reduce", "3"), ("-k", "9", "--seeding", "d2")):
+            for options in LAYOUTS + (("--max-error", "3"), ("--reduce", "3"), ("-k", "9", "--seeding", "d2"), ("--zstd", "3")):
                 with self.subTest(source=source, options=options):
                     file = self.encode(source, *options)
                     info = self.compare(file)
