@@ -71,12 +71,12 @@ class ContainerWriter {
 };
 
 /// A container in memory (mapped, as a rule). Safe on any bytes: opening validates header, trailer and table
-/// against the bytes that are there; a chunk's checksum is verified, and the chunk expanded if it is compressed, when it is
-/// first asked for.
+/// against the bytes that are there; a chunk's checksum is verified, and the chunk expanded if it is
+/// compressed, when it is first asked for.
 class Container {
  public:
-  /// `keep_alive` owns `bytes`. `name` is for messages. Expanded chunks are counted in `memory`, which outlives the container; 
-  /// without one they are not.
+  /// `keep_alive` owns `bytes`. `name` is for messages. Expanded chunks are counted in `memory`, which
+  /// outlives the container; without one they are not.
   static Result<std::shared_ptr<const Container>> open(std::span<const std::byte> bytes, std::string name,
                                                        std::shared_ptr<const void> keep_alive,
                                                        MemoryBudget* memory = nullptr);
@@ -86,8 +86,9 @@ class Container {
   uint64_t file_bytes() const { return bytes_.size(); }
   /// In file order.
   const std::vector<ChunkEntry>& table() const { return table_; }
-  /// The bytes of the i-th chunk: in the file, or expanded. ErrorCode::input if they do not match their checksum or cannot be
-  /// expanded to their length, ErrorCode::limit if there is no memory for that. Some bytes behind them may be read. Thread-safe.
+  /// The bytes of the i-th chunk: in the file, or expanded. ErrorCode::input if they do not match their
+  /// checksum or cannot be expanded to their length, ErrorCode::limit if there is no memory for that. Some
+  /// bytes behind them may be read. Thread-safe.
   Result<std::span<const std::byte>> chunk(size_t i) const;
   /// The bytes of the only chunk of this kind; ErrorCode::input if there is none, or more than one.
   Result<std::span<const std::byte>> only_chunk(uint32_t kind) const;

@@ -7,24 +7,13 @@ whatever else the machine does meets all of them. Prints a table of wall and CPU
 import argparse
 import json
 import os
+import pathlib
 import shlex
 import statistics
-import subprocess
 import sys
-import time
 
-
-def run(words):
-    """Wall seconds, CPU seconds and the largest resident set in bytes."""
-    start = time.perf_counter()
-    child = subprocess.Popen(words, stdin=subprocess.DEVNULL, stdout=subprocess.DEVNULL, stderr=subprocess.PIPE)
-    message = child.stderr.read()
-    _, status, usage = os.wait4(child.pid, 0)
-    wall = time.perf_counter() - start
-    child.returncode = os.waitstatus_to_exitcode(status)
-    if child.returncode != 0:
-        sys.exit(f"{shlex.join(words)}: exit code {child.returncode}: {message.decode(errors='replace').strip()}")
-    return wall, usage.ru_utime + usage.ru_stime, usage.ru_maxrss * 1024
+sys.path.insert(0, str(pathlib.Path(__file__).parent / "suite"))
+from process import Failed, run  # noqa: E402
 
 
 def main():
@@ -39,25 +28,28 @@ def main():
 
     load = os.getloadavg()[0]
     for words in commands:
-        run(words)
+        run(*words, out=os.devnull)
     results = [[] for _ in commands]
     for _ in range(options.rounds):
         for words, result in zip(commands, results):
-            result.append(run(words))
+            result.append(run(*words, out=os.devnull))
 
     print(f"{options.rounds} rounds; load {load:.2f} before, {os.getloadavg()[0]:.2f} after\n")
     print("| command | wall min | wall median | wall max | CPU median | MB |")
     print("| --- | ---: | ---: | ---: | ---: | ---: |")
     for command, result in zip(options.commands, results):
-        wall, cpu, memory = zip(*result)
+        wall, cpu, memory = zip(*((one.seconds, one.cpu_seconds, one.peak_bytes) for one in result))
         print(f"| `{command}` | {min(wall):.3f} | {statistics.median(wall):.3f} | {max(wall):.3f} "
               f"| {statistics.median(cpu):.3f} | {max(memory) / 1e6:.0f} |")
     if options.output:
-        rows = [{"command": command, "runs": [dict(zip(("wall_s", "cpu_s", "rss_bytes"), one)) for one in result]}
+        rows = [{"command": command, "runs": [{"wall_s": one.seconds, "cpu_s": one.cpu_seconds, "rss_bytes": one.peak_bytes} for one in result]}
                 for command, result in zip(options.commands, results)]
         with open(options.output, "w", encoding="utf-8") as out:
             json.dump(rows, out, indent=1)
 
 
 if __name__ == "__main__":
-    main()
+    try:
+        main()
+    except Failed as problem:
+        sys.exit(str(problem))

@@ -96,8 +96,7 @@ def described(row):
 
 def speed(row, kind):
     known = row.measured
-    ratio = [known[f"{kind}_ratio{end}"] for end in ("", "_least", "_greatest")]
-    return [f"{known[f'{kind}_mb_per_s']:.4g}", "{:.3g} ({:.3g}–{:.3g})".format(*ratio), f"{known[f'{kind}_peak_mb']:.0f}"]
+    return [f"{known[f'{kind}_mb_per_s']:.4g}", row.ratio(kind), f"{known[f'{kind}_peak_mb']:.0f}"]
 
 
 def lossless(options, table, add):

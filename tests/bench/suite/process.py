@@ -26,13 +26,15 @@ class Run:
 
 
 def serve():
-    """The small process: one JSON array of words a line, one JSON object a line in reply."""
+    """The small process: a line of JSON, words and where output goes, for each program, and one in reply."""
     for line in sys.stdin:
-        words = json.loads(line)
+        words, target = json.loads(line)
         out_end, out = os.pipe()
         error_end, error = os.pipe()
         actions = [(os.POSIX_SPAWN_OPEN, 0, os.devnull, os.O_RDONLY, 0), (os.POSIX_SPAWN_DUP2, out, 1),
                    (os.POSIX_SPAWN_DUP2, error, 2)]
+        if target:
+            actions.append((os.POSIX_SPAWN_OPEN, 1, target, os.O_WRONLY | os.O_CREAT | os.O_TRUNC, 0o666))
         actions += [(os.POSIX_SPAWN_CLOSE, end) for end in (out_end, out, error_end, error)]
         start = time.perf_counter()
         try:
@@ -71,13 +73,14 @@ def drain(*ends):
 _server = None
 
 
-def run(*words, may_fail=False):
-    """Runs a program to its end. Throws Failed if its exit code is not 0, unless that is an answer, too."""
+def run(*words, out=None, may_fail=False):
+    """Runs a program to its end; what it writes on standard output comes back, or goes to the file `out`. Throws Failed if its exit
+    code is not 0, unless that is an answer, too."""
     global _server
     if _server is None:
         _server = subprocess.Popen([sys.executable, "-S", __file__], stdin=subprocess.PIPE, stdout=subprocess.PIPE, text=True)
     words = list(map(str, words))
-    print(json.dumps(words), file=_server.stdin, flush=True)
+    print(json.dumps([words, str(out) if out else None]), file=_server.stdin, flush=True)
     reply = json.loads(_server.stdout.readline())
     if reply["code"] != 0 and not may_fail:
         raise Failed(f"{shlex.join(words)}: exit code {reply['code']}: {reply['message'].strip()}")

@@ -66,11 +66,9 @@ def colors(options, table, add):
             for kind, contest in (("encode", packing), ("decode", drawing)):
                 row.timed(kind, contest.seconds(key), megabytes, contest.ratio(key, ours), contest.peak_bytes(key))
             known = row.measured
-            cells = [f"{known[f'{kind}_s']:.3g}" for kind in ("encode", "decode")]
-            ratios = ["{:.3g} ({:.3g}–{:.3g})".format(*(known[f"{kind}_ratio{end}"] for end in ("", "_least", "_greatest")))
-                      for kind in ("encode", "decode")]
             add(row, [name, what, setting, f"{said['color_percent']:.2f}", f"{said['grmse']:.2f}", f"{said['max_abs_error']:.3g}",
-                      cells[0], ratios[0], f"{known['encode_peak_mb']:.0f}", cells[1], ratios[1], f"{known['decode_peak_mb']:.0f}"])
+                      *(cell for kind in ("encode", "decode")
+                        for cell in (f"{known[f'{kind}_s']:.3g}", row.ratio(kind), f"{known[f'{kind}_peak_mb']:.0f}"))])
 
 
 def files(options, table, add):

@@ -6,6 +6,8 @@ former alone, and a change of a codec shows as a change of that file. Rows of da
 import csv
 import dataclasses
 
+from contest import Ratio
+
 FIXED = ["section", "data", "what", "setting", "bytes", "percent", "bits_per_voxel", "psnr_db", "max_error", "grmse", "voxels"]
 MEASURED = ["encode_s", "encode_mb_per_s", "encode_ratio", "encode_ratio_least", "encode_ratio_greatest", "encode_peak_mb",
             "decode_s", "decode_mb_per_s", "decode_ratio", "decode_ratio_least", "decode_ratio_greatest", "decode_peak_mb",
@@ -35,6 +37,11 @@ class Row:
             f"{kind}_s": seconds, f"{kind}_mb_per_s": megabytes / seconds, f"{kind}_ratio": ratio.median,
             f"{kind}_ratio_least": ratio.least, f"{kind}_ratio_greatest": ratio.greatest,
             f"{kind}_peak_mb": peak_bytes / 1e6})
+
+
+    def ratio(self, kind):
+        """The ratio that `timed` was given."""
+        return Ratio(*(self.measured[f"{kind}_ratio{end}"] for end in ("", "_least", "_greatest")))
 
 
 def text(value):
