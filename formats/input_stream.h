@@ -38,7 +38,8 @@ class InputStream {
 
 /// "-" is standard input.
 Result<std::unique_ptr<InputStream>> open_stream(const std::string& path);
-/// Decompress on the fly; concatenated members are followed, trailing zeros allowed. The memory used does not depend on the data.
+/// Decompress on the fly; concatenated members are followed, trailing zeros allowed. The memory used does not
+/// depend on the data.
 std::unique_ptr<InputStream> gunzip(std::unique_ptr<InputStream> packed);
 std::unique_ptr<InputStream> bunzip2(std::unique_ptr<InputStream> packed);
 /// Gives back bytes that were read ahead (to recognise a format) in front of the rest.

@@ -11,8 +11,9 @@
 
 namespace voxkit {
 
-/// Bytes written beside the final name and renamed over it by `commit`. Until then, and after any error, signal or
-/// crash, the final name is untouched; the temporary is removed by the destructor and by SIGINT, SIGTERM and SIGHUP.
+/// Bytes written beside the final name and renamed over it by `commit`. Until then, and after any error,
+/// signal or crash, the final name is untouched; the temporary is removed by the destructor and by SIGINT,
+/// SIGTERM and SIGHUP.
 /// "-" is standard output, written through as it comes; refused where that is a terminal.
 class OutputFile {
  public:

@@ -31,7 +31,8 @@ template <class T>
 using Result = tl::expected<T, Error>;
 using Status = Result<void>;
 
-/// Control characters in `what`, which may quote a file, become '?': a message stays one line and harmless on a terminal.
+/// Control characters in `what`, which may quote a file, become '?': a message stays one line and harmless on
+/// a terminal.
 inline tl::unexpected<Error> fail(ErrorCode code, std::string file, std::string what) {
   for (char& c : what)
     if (static_cast<unsigned char>(c) < ' ' || c == '\x7f') c = '?';

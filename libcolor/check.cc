@@ -7,9 +7,9 @@
 
 #include "formats/parallel.h"
 #include "formats/reservation.h"
-#include "libcolor/morton.h"
-#include "libcolor/palette_check.h"
+#include "libcolor/palette/palette_check.h"
 #include "libcolor/store.h"
+#include "libcolor/surface/morton.h"
 
 namespace voxkit::color {
 namespace {

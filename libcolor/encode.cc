@@ -6,16 +6,16 @@
 
 #include "formats/parallel.h"
 #include "formats/reservation.h"
-#include "libcolor/astc.h"
-#include "libcolor/block_encode.h"
-#include "libcolor/color_order.h"
-#include "libcolor/dag_builder.h"
-#include "libcolor/dag_recount.h"
-#include "libcolor/image_codec.h"
-#include "libcolor/lab_colors.h"
+#include "libcolor/blocks/block_encode.h"
+#include "libcolor/blocks/lab_colors.h"
+#include "libcolor/dag/color_order.h"
+#include "libcolor/dag/dag_builder.h"
+#include "libcolor/dag/dag_recount.h"
 #include "libcolor/layout.h"
-#include "libcolor/palette_encode.h"
-#include "libcolor/texture.h"
+#include "libcolor/palette/palette_encode.h"
+#include "libcolor/textures/astc.h"
+#include "libcolor/textures/image_codec.h"
+#include "libcolor/textures/texture.h"
 
 namespace voxkit::color {
 namespace {

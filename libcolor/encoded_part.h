@@ -6,7 +6,7 @@
 #include <cstdint>
 #include <vector>
 
-#include "libcolor/surface.h"
+#include "libcolor/surface/surface.h"
 
 namespace voxkit::color {
 

@@ -5,9 +5,10 @@
 #include <algorithm>
 #include <bit>
 
-#include "libcolor/astc.h"
-#include "libcolor/palette.h"
-#include "libcolor/texture.h"
+#include "formats/little_endian.h"
+#include "libcolor/palette/palette.h"
+#include "libcolor/textures/astc.h"
+#include "libcolor/textures/texture.h"
 
 namespace voxkit::color {
 namespace {

@@ -4,7 +4,7 @@
 
 #include <algorithm>
 
-#include "libcolor/image_codec.h"
+#include "libcolor/textures/image_codec.h"
 
 namespace voxkit::color {
 

@@ -6,11 +6,11 @@
 #include <mutex>
 #include <vector>
 
-#include "libcolor/dag_view.h"
-#include "libcolor/decoded_parts.h"
+#include "libcolor/dag/dag_view.h"
 #include "libcolor/layout.h"
-#include "libcolor/palette_layout.h"
-#include "libcolor/texture.h"
+#include "libcolor/palette/palette_layout.h"
+#include "libcolor/textures/decoded_parts.h"
+#include "libcolor/textures/texture.h"
 
 namespace voxkit::color {
 

@@ -2,12 +2,12 @@
 
 #include <array>
 
-#include "formats/coded_image.h"
-#include "libcolor/block_image.h"
-#include "libcolor/image_codec.h"
-#include "libcolor/part_image.h"
+#include "formats/image/coded_image.h"
 #include "libcolor/store.h"
-#include "libcolor/texture.h"
+#include "libcolor/textures/block_image.h"
+#include "libcolor/textures/image_codec.h"
+#include "libcolor/textures/part_image.h"
+#include "libcolor/textures/texture.h"
 
 namespace voxkit::color {
 namespace {

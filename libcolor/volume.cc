@@ -4,9 +4,9 @@
 #include <algorithm>
 #include <bit>
 
-#include "libcolor/morton.h"
+#include "libcolor/dag/void_search.h"
 #include "libcolor/store.h"
-#include "libcolor/void_search.h"
+#include "libcolor/surface/morton.h"
 
 namespace voxkit::color {
 namespace {

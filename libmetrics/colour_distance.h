@@ -1,7 +1,7 @@
 // Colour differences as people see them: CIELAB.
 #pragma once
 
-#include "formats/image.h"
+#include "formats/image/image.h"
 #include "formats/lab.h"
 
 namespace voxkit {

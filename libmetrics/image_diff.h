@@ -4,7 +4,7 @@
 #include <cstdint>
 #include <optional>
 
-#include "formats/image.h"
+#include "formats/image/image.h"
 #include "libmetrics/error_histogram.h"
 
 namespace voxkit {

@@ -3,7 +3,7 @@
 
 #include <optional>
 
-#include "formats/image.h"
+#include "formats/image/image.h"
 
 namespace voxkit {
 
@@ -27,7 +27,8 @@ struct Ssim {
 /// that many samples.
 ///
 /// Computed in double precision with sums in a fixed order: the same bits for any number of threads. Off by
-/// less than 1e-6, whatever the samples. A NaN or an infinity makes the results NaN. Errors: ErrorCode::usage for other images; ErrorCode::limit.
+/// less than 1e-6, whatever the samples. A NaN or an infinity makes the results NaN. Errors: ErrorCode::usage
+/// for other images; ErrorCode::limit.
 Result<Ssim> ssim(const Image& a, const Image& b, std::optional<double> peak, Context& ctx);
 
 /// Rec. 709 luma of the stored values: 0.2126 R + 0.7152 G + 0.0722 B. Grey is itself, alpha is ignored.

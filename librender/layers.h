@@ -3,8 +3,9 @@
 
 #include <optional>
 
-#include "formats/image.h"
-#include "librender/ray_cast.h"
+#include "formats/image/image.h"
+#include "librender/camera.h"
+#include "librender/frame.h"
 
 namespace voxkit::render {
 

@@ -2,7 +2,7 @@
 // voxels stand for has to be guessed from what is around a pixel.
 #pragma once
 
-#include "formats/image.h"
+#include "formats/image/image.h"
 #include "librender/surface.h"
 
 namespace voxkit::render {

@@ -1,7 +1,7 @@
 // Ambient occlusion in screen space, by horizons (Bavoil, Sainz, Dimitrov 2008).
 #pragma once
 
-#include "formats/image.h"
+#include "formats/image/image.h"
 #include "librender/surface.h"
 
 namespace voxkit::render {

@@ -7,7 +7,8 @@
 #include <glm/vec3.hpp>
 
 #include "formats/copy.h"
-#include "librender/ray_cast.h"
+#include "librender/camera.h"
+#include "librender/frame.h"
 
 namespace voxkit::render {
 

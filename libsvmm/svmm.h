@@ -62,7 +62,7 @@ struct Params {
   double quality = 90;      ///< 0..100; recorded, the encoder works with delta
   double delta = 0.1;       ///< Euclidean distance of attributes scaled to 0..1
   double full_scale = 255;  ///< stored value that stands for 1: 255; DENSITY16, FLOAT32: see full_scale.h
-  int zstd = 0;            ///< level of zstd for the file's chunks, 1 to 19; 0: as they are. Of the encoder alone
+  int zstd = 0;  ///< level of zstd for the file's chunks, 1 to 19; 0: as they are. Of the encoder alone
 };
 
 /// delta of a quality q. plain: sqrt(n) (1 - q/100) over the format's n attributes; thesis: 1 - q/100.

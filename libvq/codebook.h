@@ -4,8 +4,8 @@
 #include <memory>
 #include <vector>
 
-#include "libvq/rbuc.h"
 #include "formats/reservation.h"
+#include "libvq/rbuc.h"
 #include "libvq/vq.h"
 
 namespace voxkit::vq {

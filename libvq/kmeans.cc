@@ -7,10 +7,10 @@
 #include <cmath>
 #include <numeric>
 
+#include "formats/reservation.h"
 #include "libvq/kmeans_assign.h"
 #include "libvq/kmeans_means.h"
 #include "libvq/nearest_centre.h"
-#include "formats/reservation.h"
 #include "libvq/seeding.h"
 
 namespace voxkit::vq {

@@ -1,8 +1,8 @@
 // Codewords decoded with AVX2: the same results as the portable functions of rbuc.h.
 #pragma once
 
-#include "libvq/brick.h"
 #include "formats/cpu.h"
+#include "libvq/brick.h"
 
 #ifdef VOXKIT_AVX2
 

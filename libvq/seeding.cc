@@ -27,7 +27,8 @@ uint64_t RecentCentres::nearest(const Brick& brick, const Key& key, uint64_t dis
   std::array<uint64_t, leaf_bricks> distances;
   for (size_t leaf = begin / leaf_bricks; leaf * leaf_bricks < size_; ++leaf) {
     std::array<uint32_t, 2> masks;
-    kernels_->near_bricks(leaves_[leaf], norms_.data() + leaf * leaf_bricks, &query, &number, 1, masks.data());
+    kernels_->near_bricks(leaves_[leaf], norms_.data() + leaf * leaf_bricks, &query, &number, 1,
+                          masks.data());
     uint32_t mask = masks[0];
     if (size_ - leaf * leaf_bricks < leaf_bricks) mask &= (1u << (size_ - leaf * leaf_bricks)) - 1;
     if (mask == 0) continue;

@@ -5,10 +5,10 @@
 #include <optional>
 #include <string>
 
-#include "formats/readers.h"
-#include "librender/device_dvr.h"
-#include "librender/device_grid.h"
-#include "librender/dvr.h"
+#include "formats/volume/readers.h"
+#include "librender/device/device_dvr.h"
+#include "librender/device/device_grid.h"
+#include "librender/dvr/dvr.h"
 #include "tools/common/main.h"
 
 namespace voxkit::cli {

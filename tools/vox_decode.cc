@@ -3,8 +3,8 @@
 
 #include "formats/convert.h"
 #include "formats/copy.h"
-#include "formats/open_volume.h"
-#include "formats/readers.h"
+#include "formats/volume/open_volume.h"
+#include "formats/volume/readers.h"
 #include "tools/common/input.h"
 #include "tools/common/json.h"
 #include "tools/common/main.h"

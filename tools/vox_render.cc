@@ -9,7 +9,8 @@
 #include <utility>
 #include <vector>
 
-#include "formats/image.h"
+#include "formats/image/image.h"
+#include "formats/names.h"
 #include "formats/output_file.h"
 #include "libmetrics/image_diff.h"
 #include "libmetrics/ssim.h"
@@ -19,7 +20,6 @@
 #include "tools/common/input.h"
 #include "tools/common/json.h"
 #include "tools/common/main.h"
-#include "tools/common/numbered_name.h"
 #include "tools/common/retype.h"
 #include "tools/render_scene.h"
 
@@ -260,13 +260,14 @@ Result<int> work(const Options& o, Run& run) {
   }
   std::vector<std::string> names;
   if (!o.no_images) {
-    const bool pattern = o.output.find('%') != std::string::npos;
+    const bool pattern = is_numbered(o.output);
     if (!o.path.empty() && !pattern)
       return bad_usage("-o " + o.output + ": a path needs a pattern such as frame-%04d.png");
     for (size_t i = 0; i < cameras.size(); ++i) {
       names.push_back(o.output);
       if (pattern) {
-        VOX_TRY(names.back(), numbered_name("-o", o.output, i));
+        VOX_TRY(const NumberedName numbered, numbered_name(o.output));
+        names.back() = numbered.path(i);
       }
       VOX_CHECK(check_image_output(names.back(), run.options.force));
     }

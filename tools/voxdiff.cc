@@ -6,8 +6,8 @@
 #include <limits>
 #include <vector>
 
-#include "formats/image.h"
-#include "formats/open_volume.h"
+#include "formats/image/image.h"
+#include "formats/volume/open_volume.h"
 #include "libmetrics/colour_distance.h"
 #include "libmetrics/image_diff.h"
 #include "libmetrics/ssim.h"

@@ -5,7 +5,7 @@
 #include <cstdint>
 #include <vector>
 
-#include "libcolor/surface.h"
+#include "libcolor/surface/surface.h"
 #include "libcolor/terrain/noise.h"
 
 namespace voxkit::color::terrain {

@@ -3,7 +3,7 @@
 #include <algorithm>
 #include <bit>
 
-#include "libcolor/morton.h"
+#include "libcolor/surface/morton.h"
 
 namespace voxkit::color::terrain {
 namespace {

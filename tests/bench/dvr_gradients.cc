@@ -9,10 +9,10 @@
 #include <random>
 #include <vector>
 
-#include "formats/builtin.h"
-#include "formats/readers.h"
-#include "librender/dvr_kernel.h"
-#include "librender/grid.h"
+#include "formats/volume/builtin.h"
+#include "formats/volume/readers.h"
+#include "librender/cast/grid.h"
+#include "librender/dvr/dvr_kernel.h"
 #include "tools/common/input.h"
 #include "tools/common/json.h"
 #include "tools/common/main.h"

@@ -2,8 +2,8 @@
 #include <array>
 #include <vector>
 
-#include "formats/builtin.h"
 #include "formats/copy.h"
+#include "formats/volume/builtin.h"
 #include "libvq/rbuc.h"
 #include "tests/bench/bricks.h"
 #include "tests/bench/ceilings.h"

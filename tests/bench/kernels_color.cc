@@ -3,10 +3,10 @@
 #include <vector>
 
 #include "formats/hash.h"
-#include "libcolor/block_encode.h"
-#include "libcolor/block_fit.h"
-#include "libcolor/block_plan.h"
-#include "libcolor/terrain.h"
+#include "libcolor/blocks/block_encode.h"
+#include "libcolor/blocks/block_fit.h"
+#include "libcolor/blocks/block_plan.h"
+#include "libcolor/terrain/terrain.h"
 #include "tests/bench/ceilings.h"
 #include "tests/bench/kernels.h"
 #include "tests/bench/thread_time.h"

@@ -1,6 +1,6 @@
 // SSIM and MS-SSIM of two pictures.
-#include "formats/builtin.h"
 #include "formats/hash.h"
+#include "formats/volume/builtin.h"
 #include "libmetrics/ssim.h"
 #include "tests/bench/ceilings.h"
 #include "tests/bench/kernels.h"

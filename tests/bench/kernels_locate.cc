@@ -2,12 +2,12 @@
 #include <array>
 #include <vector>
 
-#include "formats/builtin.h"
 #include "formats/hash.h"
-#include "libcolor/dag_builder.h"
-#include "libcolor/dag_view.h"
+#include "formats/volume/builtin.h"
+#include "libcolor/dag/dag_builder.h"
+#include "libcolor/dag/dag_view.h"
 #include "libcolor/layout.h"
-#include "libcolor/terrain.h"
+#include "libcolor/terrain/terrain.h"
 #include "libsvmm/walk.h"
 #include "libvq/store.h"
 #include "tests/bench/ceilings.h"

@@ -3,11 +3,11 @@
 #include <cmath>
 #include <vector>
 
-#include "formats/builtin.h"
 #include "formats/hash.h"
+#include "formats/volume/builtin.h"
 #include "libcolor/color.h"
-#include "libcolor/terrain.h"
-#include "librender/ray_cast.h"
+#include "libcolor/terrain/terrain.h"
+#include "librender/cast/ray_cast.h"
 #include "tests/bench/ceilings.h"
 #include "tests/bench/kernels.h"
 #include "tests/bench/thread_time.h"

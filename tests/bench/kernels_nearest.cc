@@ -3,8 +3,8 @@
 #include <bit>
 #include <vector>
 
-#include "formats/builtin.h"
 #include "formats/hash.h"
+#include "formats/volume/builtin.h"
 #include "libvq/nearest_centre.h"
 #include "tests/bench/bricks.h"
 #include "tests/bench/ceilings.h"

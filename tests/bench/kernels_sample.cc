@@ -2,12 +2,12 @@
 #include <array>
 #include <vector>
 
-#include "formats/builtin.h"
 #include "formats/cpu.h"
 #include "formats/hash.h"
-#include "librender/dense_sampler.h"
-#include "librender/dvr.h"
-#include "librender/dvr_lanes.h"
+#include "formats/volume/builtin.h"
+#include "librender/dvr/dense_sampler.h"
+#include "librender/dvr/dvr.h"
+#include "librender/dvr/dvr_lanes.h"
 #include "tests/bench/ceilings.h"
 #include "tests/bench/kernels.h"
 #include "tests/bench/thread_time.h"

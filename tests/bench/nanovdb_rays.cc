@@ -8,8 +8,8 @@
 #include <utility>
 
 #include "formats/copy.h"
-#include "libcolor/volume_surface.h"
-#include "librender/ray_cast.h"
+#include "libcolor/surface/volume_surface.h"
+#include "librender/cast/ray_cast.h"
 #include "tests/bench/nanovdb_cast.h"
 #include "tests/bench/opaque_source.h"
 #include "tools/common/input.h"

@@ -6,11 +6,11 @@
 #include <vector>
 
 #include "formats/hash.h"
-#include "libcolor/block_encode.h"
-#include "libcolor/color_order.h"
-#include "libcolor/dag_builder.h"
-#include "libcolor/dag_recount.h"
-#include "libcolor/dag_view.h"
+#include "libcolor/blocks/block_encode.h"
+#include "libcolor/dag/color_order.h"
+#include "libcolor/dag/dag_builder.h"
+#include "libcolor/dag/dag_recount.h"
+#include "libcolor/dag/dag_view.h"
 #include "libcolor/layout.h"
 #include "libcolor/store.h"
 #include "tests/bench/thread_time.h"

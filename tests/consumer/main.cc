@@ -3,10 +3,10 @@
 #include <cstdio>
 #include <vector>
 
-#include "formats/builtin.h"
 #include "formats/container.h"
+#include "formats/volume/builtin.h"
 #include "libmetrics/volume_diff.h"
-#include "librender/ray_cast.h"
+#include "librender/cast/ray_cast.h"
 #include "libsvmm/svmm.h"
 #include "libvq/vq.h"
 

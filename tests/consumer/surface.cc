@@ -1,9 +1,9 @@
 // A coloured surface, compressed and opened again.
 #include <vector>
 
-#include "formats/builtin.h"
+#include "formats/volume/builtin.h"
 #include "libcolor/color.h"
-#include "libcolor/volume_surface.h"
+#include "libcolor/surface/volume_surface.h"
 
 namespace consumer {
 

@@ -1,4 +1,4 @@
-#include "formats/builtin.h"
+#include "formats/volume/builtin.h"
 
 #include <gtest/gtest.h>
 
@@ -11,7 +11,7 @@
 #include <string>
 #include <vector>
 
-#include "formats/readers.h"
+#include "formats/volume/readers.h"
 #include "tests/memory_volume.h"
 
 namespace voxkit {

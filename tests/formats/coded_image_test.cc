@@ -1,5 +1,5 @@
 // Images as files in memory: what comes back, and files of other kinds.
-#include "formats/coded_image.h"
+#include "formats/image/coded_image.h"
 
 #include <gtest/gtest.h>
 #include <zlib.h>

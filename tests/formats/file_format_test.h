@@ -11,7 +11,7 @@
 #include <string>
 #include <vector>
 
-#include "formats/readers.h"
+#include "formats/volume/readers.h"
 
 namespace voxkit {
 

@@ -8,7 +8,7 @@
 #include <map>
 #include <thread>
 
-#include "formats/image.h"
+#include "formats/image/image.h"
 #include "formats/little_endian.h"
 #include "formats/module.h"
 #include "tests/formats/file_format_test.h"

@@ -6,7 +6,7 @@
 #include <fstream>
 #include <map>
 
-#include "formats/magicavoxel.h"
+#include "formats/mesh/magicavoxel.h"
 
 namespace voxkit {
 namespace {

@@ -1,9 +1,9 @@
 // PLY files, which our own reader reads.
 #include <gtest/gtest.h>
 
-#include "formats/image.h"
-#include "formats/mesh.h"
-#include "formats/mesh_ply.h"
+#include "formats/image/image.h"
+#include "formats/mesh/mesh.h"
+#include "formats/mesh/mesh_ply.h"
 #include "formats/module.h"
 #include "tests/formats/file_format_test.h"
 #include "tests/formats/mesh_files.h"

@@ -1,13 +1,13 @@
 // Meshes and their textures as they are read.
-#include "formats/mesh.h"
+#include "formats/mesh/mesh.h"
 
 #include <gtest/gtest.h>
 
 #include <cmath>
 #include <set>
 
-#include "formats/image.h"
-#include "formats/mesh_parts.h"
+#include "formats/image/image.h"
+#include "formats/mesh/mesh_parts.h"
 #include "formats/module.h"
 #include "tests/formats/file_format_test.h"
 #include "tests/formats/mesh_files.h"

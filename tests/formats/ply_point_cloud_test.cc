@@ -3,7 +3,7 @@
 
 #include <cstring>
 
-#include "formats/point_cloud.h"
+#include "formats/mesh/point_cloud.h"
 #include "tests/formats/file_format_test.h"
 
 namespace voxkit {

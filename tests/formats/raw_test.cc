@@ -1,6 +1,6 @@
 #include <cmath>
 
-#include "formats/dense_source.h"
+#include "formats/volume/dense_source.h"
 #include "tests/formats/file_format_test.h"
 
 namespace voxkit {

@@ -1,5 +1,5 @@
 // Small images in files.
-#include "formats/coded_image.h"
+#include "formats/image/coded_image.h"
 #include "tests/fuzz/harness.h"
 #include "tests/fuzz/seeds.h"
 

@@ -13,8 +13,8 @@
 #include <memory>
 #include <vector>
 
-#include "formats/mesh.h"
-#include "formats/point_cloud.h"
+#include "formats/mesh/mesh.h"
+#include "formats/mesh/point_cloud.h"
 #include "tests/fuzz/seeds.h"
 
 namespace voxkit::fuzz {

@@ -9,7 +9,7 @@
 #include <string>
 #include <vector>
 
-#include "formats/readers.h"
+#include "formats/volume/readers.h"
 
 namespace voxkit::fuzz {
 

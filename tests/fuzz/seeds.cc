@@ -9,7 +9,7 @@
 #include <iterator>
 #include <utility>
 
-#include "formats/open_volume.h"
+#include "formats/volume/open_volume.h"
 #include "tests/formats/packing_test.h"
 
 namespace voxkit::fuzz {

@@ -13,7 +13,7 @@
 #include <vector>
 
 #include "libcolor/color.h"
-#include "libcolor/morton.h"
+#include "libcolor/surface/morton.h"
 
 namespace voxkit::color::test {
 

@@ -4,9 +4,9 @@
 
 #include <cmath>
 
-#include "libcolor/block_encode.h"
-#include "libcolor/block_kernel.h"
-#include "libcolor/block_plan.h"
+#include "libcolor/blocks/block_encode.h"
+#include "libcolor/blocks/block_kernel.h"
+#include "libcolor/blocks/block_plan.h"
 #include "tests/libcolor/color_runs.h"
 
 namespace voxkit::color {

@@ -5,7 +5,7 @@
 #include <string>
 #include <vector>
 
-#include "libcolor/surface.h"
+#include "libcolor/surface/surface.h"
 
 namespace voxkit::color {
 

@@ -6,10 +6,10 @@
 #include <map>
 #include <set>
 
-#include "libcolor/dag_builder.h"
-#include "libcolor/dag_recount.h"
-#include "libcolor/dag_view.h"
-#include "libcolor/morton.h"
+#include "libcolor/dag/dag_builder.h"
+#include "libcolor/dag/dag_recount.h"
+#include "libcolor/dag/dag_view.h"
+#include "libcolor/surface/morton.h"
 #include "tests/libcolor/scenes.h"
 
 namespace voxkit::color {

@@ -11,9 +11,9 @@
 #include <map>
 #include <sstream>
 
-#include "formats/readers.h"
-#include "libcolor/terrain.h"
-#include "libcolor/volume_surface.h"
+#include "formats/volume/readers.h"
+#include "libcolor/surface/volume_surface.h"
+#include "libcolor/terrain/terrain.h"
 #include "tests/damage.h"
 #include "tests/libcolor/color_runs.h"
 #include "tests/libcolor/scenes.h"

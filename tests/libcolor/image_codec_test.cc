@@ -1,5 +1,5 @@
 // Colours as images: their size, what comes back, and how decoded parts are kept.
-#include "libcolor/image_codec.h"
+#include "libcolor/textures/image_codec.h"
 
 #include <gtest/gtest.h>
 
@@ -7,8 +7,8 @@
 #include <thread>
 
 #include "formats/module.h"
-#include "libcolor/decoded_parts.h"
-#include "libcolor/part_image.h"
+#include "libcolor/textures/decoded_parts.h"
+#include "libcolor/textures/part_image.h"
 #include "tests/damage.h"
 #include "tests/libcolor/color_runs.h"
 #include "tests/libcolor/scenes.h"

@@ -5,9 +5,9 @@
 
 #include <cmath>
 
-#include "libcolor/block_encode.h"
-#include "libcolor/block_kernel.h"
-#include "libcolor/lab_colors.h"
+#include "libcolor/blocks/block_encode.h"
+#include "libcolor/blocks/block_kernel.h"
+#include "libcolor/blocks/lab_colors.h"
 #include "tests/libcolor/color_runs.h"
 
 namespace voxkit::color {

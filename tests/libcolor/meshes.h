@@ -9,7 +9,7 @@
 #include <random>
 #include <vector>
 
-#include "libcolor/voxelise.h"
+#include "libcolor/surface/voxelise.h"
 
 namespace voxkit::color {
 

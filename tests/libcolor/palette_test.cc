@@ -6,12 +6,12 @@
 #include <map>
 #include <set>
 
-#include "libcolor/palette.h"
-#include "libcolor/palette_check.h"
-#include "libcolor/palette_encode.h"
-#include "libcolor/palette_layout.h"
-#include "libcolor/palette_plan.h"
-#include "libcolor/palette_split.h"
+#include "libcolor/palette/palette.h"
+#include "libcolor/palette/palette_check.h"
+#include "libcolor/palette/palette_encode.h"
+#include "libcolor/palette/palette_layout.h"
+#include "libcolor/palette/palette_plan.h"
+#include "libcolor/palette/palette_split.h"
 #include "tests/libcolor/color_runs.h"
 
 namespace voxkit::color {

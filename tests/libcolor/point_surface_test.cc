@@ -1,5 +1,5 @@
 // Points as surfaces, in one part and in many.
-#include "libcolor/point_surface.h"
+#include "libcolor/surface/point_surface.h"
 
 #include <gtest/gtest.h>
 
@@ -7,7 +7,7 @@
 #include <map>
 #include <random>
 
-#include "libcolor/linear_light.h"
+#include "libcolor/surface/linear_light.h"
 #include "tests/libcolor/scenes.h"
 
 namespace voxkit::color {

@@ -8,10 +8,10 @@
 #include <vector>
 
 #include "libcolor/color.h"
-#include "libcolor/image_codec.h"
-#include "libcolor/morton.h"
-#include "libcolor/surface.h"
-#include "libcolor/texture.h"
+#include "libcolor/surface/morton.h"
+#include "libcolor/surface/surface.h"
+#include "libcolor/textures/image_codec.h"
+#include "libcolor/textures/texture.h"
 
 namespace voxkit::color {
 

@@ -1,6 +1,6 @@
 // The built-in scene: voxels in order, a surface without holes, a hidden box, the same on any number of
 // threads.
-#include "libcolor/terrain.h"
+#include "libcolor/terrain/terrain.h"
 
 #include <gtest/gtest.h>
 

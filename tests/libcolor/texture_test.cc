@@ -4,11 +4,12 @@
 #include <cmath>
 #include <set>
 
-#include "libcolor/astc.h"
-#include "libcolor/bc1.h"
-#include "libcolor/bc7.h"
-#include "libcolor/bc7_modes.h"
-#include "libcolor/texture.h"
+#include "formats/little_endian.h"
+#include "libcolor/textures/astc.h"
+#include "libcolor/textures/bc1.h"
+#include "libcolor/textures/bc7.h"
+#include "libcolor/textures/bc7_modes.h"
+#include "libcolor/textures/texture.h"
 #include "tests/libcolor/color_runs.h"
 #include "tests/libcolor/scenes.h"
 

@@ -5,9 +5,9 @@
 
 #include <random>
 
-#include "libcolor/block_image.h"
-#include "libcolor/part_image.h"
-#include "libcolor/texture.h"
+#include "libcolor/textures/block_image.h"
+#include "libcolor/textures/part_image.h"
+#include "libcolor/textures/texture.h"
 #include "tests/libcolor/color_runs.h"
 #include "tests/libcolor/scenes.h"
 

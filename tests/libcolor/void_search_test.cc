@@ -1,12 +1,12 @@
 // Asking whether a box is void agrees with a look at each of its voxels.
-#include "libcolor/void_search.h"
+#include "libcolor/dag/void_search.h"
 
 #include <gtest/gtest.h>
 
 #include <random>
 #include <set>
 
-#include "libcolor/dag_builder.h"
+#include "libcolor/dag/dag_builder.h"
 #include "tests/libcolor/scenes.h"
 
 namespace voxkit::color {

@@ -6,7 +6,7 @@
 
 #include "libcolor/color.h"
 #include "libcolor/store.h"
-#include "libcolor/volume_surface.h"
+#include "libcolor/surface/volume_surface.h"
 #include "tests/libcolor/scenes.h"
 
 namespace voxkit::color {

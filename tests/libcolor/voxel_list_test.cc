@@ -1,7 +1,7 @@
 // Models as surfaces.
 #include <gtest/gtest.h>
 
-#include "libcolor/voxel_list.h"
+#include "libcolor/surface/voxel_list.h"
 #include "tests/libcolor/scenes.h"
 
 namespace voxkit::color {

@@ -1,7 +1,7 @@
 // Colours of voxels against what is known of a mesh.
 #include <cmath>
 
-#include "libcolor/linear_light.h"
+#include "libcolor/surface/linear_light.h"
 #include "tests/libcolor/meshes.h"
 
 namespace voxkit::color {

@@ -6,7 +6,7 @@
 #include <array>
 #include <vector>
 
-#include "libcolor/triangle_cells.h"
+#include "libcolor/surface/triangle_cells.h"
 
 namespace voxkit::color {
 

@@ -1,5 +1,5 @@
 // Meshes to voxels: the right ones, in order, the same for all ways to divide the work.
-#include "libcolor/voxelise.h"
+#include "libcolor/surface/voxelise.h"
 
 #include <algorithm>
 #include <cinttypes>

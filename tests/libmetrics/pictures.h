@@ -6,7 +6,7 @@
 #include <functional>
 #include <utility>
 
-#include "formats/image.h"
+#include "formats/image/image.h"
 
 namespace voxkit::test {
 

@@ -3,8 +3,8 @@
 
 #include <cmath>
 
-#include "formats/readers.h"
-#include "librender/ray_cast.h"
+#include "formats/volume/readers.h"
+#include "librender/cast/ray_cast.h"
 #include "tests/libsvmm/volumes.h"
 
 namespace voxkit::render {

@@ -6,8 +6,8 @@
 #include "libcolor/color.h"
 #include "libcolor/store.h"
 #include "librender/camera.h"
-#include "librender/ray_cast.h"
-#include "librender/surface_colors.h"
+#include "librender/cast/ray_cast.h"
+#include "librender/cast/surface_colors.h"
 #include "tests/libcolor/scenes.h"
 #include "tests/librender/emulated_launch.h"
 

@@ -5,8 +5,8 @@
 #include <cstdlib>
 #include <cstring>
 
-#include "formats/readers.h"
-#include "librender/flat_pools.h"
+#include "formats/volume/readers.h"
+#include "librender/device/flat_pools.h"
 #include "tests/librender/emulated_launch.h"
 #include "tests/libsvmm/volumes.h"
 

@@ -4,11 +4,11 @@
 
 #include <cstring>
 
-#include "formats/readers.h"
-#include "librender/dvr_job.h"
-#include "librender/dvr_lanes.h"
-#include "librender/vq_flat_pools.h"
-#include "librender/warp_kernel.h"
+#include "formats/volume/readers.h"
+#include "librender/device/vq_flat_pools.h"
+#include "librender/device/warp_kernel.h"
+#include "librender/dvr/dvr_job.h"
+#include "librender/dvr/dvr_lanes.h"
 #include "tests/libvq/volumes.h"
 
 namespace voxkit::render {

@@ -8,8 +8,8 @@
 #include <random>
 #include <vector>
 
-#include "librender/dvr_lanes.h"
-#include "librender/dvr_packet.h"
+#include "librender/dvr/dvr_lanes.h"
+#include "librender/dvr/dvr_packet.h"
 
 namespace voxkit::render {
 namespace {

@@ -1,6 +1,6 @@
 // Direct volume rendering against a plain renderer in doubles, and against itself from every form of a
 // volume.
-#include "librender/dvr.h"
+#include "librender/dvr/dvr.h"
 
 #include <gtest/gtest.h>
 
@@ -10,7 +10,7 @@
 #include <glm/geometric.hpp>
 #include <glm/vec4.hpp>
 
-#include "formats/readers.h"
+#include "formats/volume/readers.h"
 #include "librender/light.h"
 #include "tests/libsvmm/volumes.h"
 #include "tests/libvq/volumes.h"

@@ -5,9 +5,9 @@
 
 #include <vector>
 
-#include "librender/cast_kernel.h"
-#include "librender/cast_params.h"
-#include "librender/ray_cast.h"
+#include "librender/cast/cast_kernel.h"
+#include "librender/cast/cast_params.h"
+#include "librender/cast/ray_cast.h"
 
 namespace voxkit::render {
 

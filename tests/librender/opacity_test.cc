@@ -1,5 +1,5 @@
 // Opacity over a length against the standard library's functions.
-#include "librender/opacity.h"
+#include "librender/cast/opacity.h"
 
 #include <gtest/gtest.h>
 

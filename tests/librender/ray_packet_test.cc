@@ -1,12 +1,12 @@
 // Rays side by side go where each goes alone.
-#include "librender/ray_packet.h"
+#include "librender/cast/ray_packet.h"
 
 #include <gtest/gtest.h>
 
 #include <algorithm>
 #include <random>
 
-#include "librender/cast_params.h"
+#include "librender/cast/cast_params.h"
 
 namespace voxkit::render {
 namespace {

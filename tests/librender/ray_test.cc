@@ -1,6 +1,6 @@
 // Rays against a reference in integers: which voxels, in which order, and that steps over cells of any size
 // land in the same ones.
-#include "librender/ray.h"
+#include "librender/cast/ray.h"
 
 #include <gtest/gtest.h>
 

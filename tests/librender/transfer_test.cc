@@ -1,4 +1,4 @@
-#include "librender/transfer.h"
+#include "librender/dvr/transfer.h"
 
 #include <gtest/gtest.h>
 

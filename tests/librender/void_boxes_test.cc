@@ -1,11 +1,11 @@
 // Boxes of void are void, and as large as they get; asking all voxels of a box agrees with looking at each.
-#include "librender/void_boxes.h"
+#include "librender/cast/void_boxes.h"
 
 #include <gtest/gtest.h>
 
 #include <random>
 
-#include "formats/readers.h"
+#include "formats/volume/readers.h"
 #include "tests/libsvmm/volumes.h"
 
 namespace voxkit::render {

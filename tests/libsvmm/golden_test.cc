@@ -11,7 +11,7 @@
 #include <map>
 #include <sstream>
 
-#include "formats/readers.h"
+#include "formats/volume/readers.h"
 #include "tests/damage.h"
 #include "tests/libsvmm/volumes.h"
 

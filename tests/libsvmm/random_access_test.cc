@@ -2,7 +2,7 @@
 // touched.
 #include <gtest/gtest.h>
 
-#include "formats/readers.h"
+#include "formats/volume/readers.h"
 #include "tests/libsvmm/volumes.h"
 
 namespace voxkit::svmm {

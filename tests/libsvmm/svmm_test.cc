@@ -4,7 +4,7 @@
 
 #include <cmath>
 
-#include "formats/readers.h"
+#include "formats/volume/readers.h"
 #include "tests/libsvmm/reference.h"
 #include "tests/libsvmm/volumes.h"
 

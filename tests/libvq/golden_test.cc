@@ -11,7 +11,7 @@
 #include <sstream>
 
 #include "formats/copy.h"
-#include "formats/readers.h"
+#include "formats/volume/readers.h"
 #include "tests/damage.h"
 #include "tests/libvq/volumes.h"
 

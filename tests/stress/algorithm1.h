@@ -1,4 +1,4 @@
-// Algorithm 1 of the thesis, as librender/cast_kernel.h has it (`follow_baseline`), voxel by voxel and
+// Algorithm 1 of the thesis, as librender/cast/cast_kernel.h has it (`follow_baseline`), voxel by voxel and
 // without a volume. tests/librender/ray_test.cc holds the two together.
 #pragma once
 

@@ -7,7 +7,7 @@
 #include <random>
 #include <vector>
 
-#include "librender/cast_kernel.h"
+#include "librender/cast/cast_kernel.h"
 
 namespace voxkit::stress {
 namespace {

@@ -4,11 +4,11 @@
 #include <algorithm>
 #include <cmath>
 
-#include "libcolor/bc1.h"
-#include "libcolor/block_encode.h"
-#include "libcolor/block_fit.h"
-#include "libcolor/lab_colors.h"
-#include "libcolor/palette.h"
+#include "libcolor/blocks/block_encode.h"
+#include "libcolor/blocks/block_fit.h"
+#include "libcolor/blocks/lab_colors.h"
+#include "libcolor/palette/palette.h"
+#include "libcolor/textures/bc1.h"
 #include "libsvmm/base_block.h"
 #include "tests/stress/exact.h"
 #include "tests/stress/report.h"

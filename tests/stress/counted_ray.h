@@ -4,7 +4,7 @@
 #include <cstdint>
 
 #define ExactRay UncountedExactRay
-#include "librender/exact_ray.h"
+#include "librender/cast/exact_ray.h"
 #undef ExactRay
 
 namespace voxkit::render {
@@ -24,4 +24,4 @@ struct ExactRay : UncountedExactRay {
 
 }  // namespace voxkit::render
 
-#include "librender/ray.h"
+#include "librender/cast/ray.h"

@@ -7,8 +7,8 @@
 #include <cmath>
 #include <cstring>
 
-#include "librender/dvr.h"
-#include "librender/dvr_kernel.h"
+#include "librender/dvr/dvr.h"
+#include "librender/dvr/dvr_kernel.h"
 #include "tests/memory_volume.h"
 #include "tests/stress/exact.h"
 #include "tests/stress/report.h"

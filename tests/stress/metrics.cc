@@ -5,7 +5,7 @@
 #include <array>
 #include <cmath>
 
-#include "formats/image.h"
+#include "formats/image/image.h"
 #include "libmetrics/image_diff.h"
 #include "libmetrics/ssim.h"
 #include "libmetrics/volume_diff.h"

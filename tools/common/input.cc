@@ -8,8 +8,8 @@
 #include "formats/container.h"
 #include "formats/input_stream.h"
 #include "formats/mapped_file.h"
-#include "formats/readers.h"
-#include "libcolor/terrain.h"
+#include "formats/volume/readers.h"
+#include "libcolor/terrain/terrain.h"
 
 namespace voxkit::cli {
 namespace {

@@ -6,7 +6,7 @@
 #include <optional>
 #include <string>
 
-#include "formats/open_volume.h"
+#include "formats/volume/open_volume.h"
 #include "libcolor/color.h"
 #include "libsvmm/svmm.h"
 #include "libvq/vq.h"

@@ -1,13 +1,13 @@
 #include "tools/common/surface_input.h"
 
-#include "formats/mesh.h"
-#include "formats/point_cloud.h"
-#include "formats/readers.h"
-#include "libcolor/point_surface.h"
-#include "libcolor/terrain.h"
-#include "libcolor/volume_surface.h"
-#include "libcolor/voxel_list.h"
-#include "libcolor/voxelise.h"
+#include "formats/mesh/mesh.h"
+#include "formats/mesh/point_cloud.h"
+#include "formats/volume/readers.h"
+#include "libcolor/surface/point_surface.h"
+#include "libcolor/surface/volume_surface.h"
+#include "libcolor/surface/voxel_list.h"
+#include "libcolor/surface/voxelise.h"
+#include "libcolor/terrain/terrain.h"
 
 namespace voxkit::cli {
 namespace {

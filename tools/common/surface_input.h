@@ -5,8 +5,8 @@
 #include <optional>
 #include <string>
 
-#include "libcolor/surface.h"
-#include "libcolor/triangle_cells.h"
+#include "libcolor/surface/surface.h"
+#include "libcolor/surface/triangle_cells.h"
 #include "tools/common/input.h"
 
 namespace voxkit::cli {

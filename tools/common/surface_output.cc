@@ -3,12 +3,12 @@
 #include <algorithm>
 #include <vector>
 
-#include "formats/magicavoxel.h"
-#include "formats/ply_points.h"
-#include "formats/readers.h"
+#include "formats/mesh/magicavoxel.h"
+#include "formats/mesh/ply_points.h"
 #include "formats/reservation.h"
-#include "libcolor/morton.h"
-#include "libcolor/palette.h"
+#include "formats/volume/readers.h"
+#include "libcolor/palette/palette.h"
+#include "libcolor/surface/morton.h"
 
 namespace voxkit::cli {
 namespace {

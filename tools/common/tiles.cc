@@ -1,13 +1,13 @@
 #include "tools/common/tiles.h"
 
 #include "formats/mapped_file.h"
+#include "formats/names.h"
 #include "formats/output_file.h"
 #include "formats/parallel.h"
 #include "formats/reservation.h"
 #include "libcolor/layout.h"
-#include "libcolor/volume_surface.h"
+#include "libcolor/surface/volume_surface.h"
 #include "tools/common/input.h"
-#include "tools/common/numbered_name.h"
 
 namespace voxkit::cli {
 namespace {
@@ -44,9 +44,10 @@ bool same_order(const color::Params& params, const color::Options& options) {
 Result<std::vector<std::string>> tile_names(const std::string& option, const std::string& pattern,
                                             const color::Params& params) {
   std::vector<std::string> names(color::part_count(params.color_count));
-  for (size_t i = 0; i < names.size(); ++i) {
-    VOX_TRY(names[i], numbered_name(option, pattern, i));
-  }
+  if (!is_numbered(pattern))
+    return bad_usage(option + " " + pattern + ": expected one %d or %04d in the name");
+  VOX_TRY(const NumberedName numbered, numbered_name(pattern));
+  for (size_t i = 0; i < names.size(); ++i) names[i] = numbered.path(i);
   return names;
 }
 

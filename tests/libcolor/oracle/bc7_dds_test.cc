@@ -10,7 +10,7 @@
 #include <vector>
 
 #include "formats/little_endian.h"
-#include "libcolor/bc7.h"
+#include "libcolor/textures/bc7.h"
 #include "tests/libcolor/color_runs.h"
 
 namespace voxkit::color {

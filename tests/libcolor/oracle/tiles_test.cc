@@ -6,7 +6,7 @@
 #include <filesystem>
 #include <fstream>
 
-#include "libcolor/part_image.h"
+#include "libcolor/textures/part_image.h"
 #include "libcolor/tiles.h"
 #include "tests/libcolor/scenes.h"
 

@@ -1,0 +1,68 @@
+// Triangle meshes with colours: what is read from .obj, .gltf, .glb and .ply files.
+#pragma once
+
+#include <array>
+#include <cstdint>
+#include <glm/vec2.hpp>
+#include <glm/vec3.hpp>
+#include <glm/vec4.hpp>
+#include <string>
+#include <vector>
+
+#include "formats/mesh/texture.h"
+#include "formats/reservation.h"
+
+namespace voxkit {
+
+/// How a texture goes on outside of 0..1.
+enum class TextureWrap : uint8_t { repeat, mirror, clamp };
+
+/// What the alpha of a material means.
+enum class AlphaMode : uint8_t {
+  opaque,  ///< nothing
+  mask,    ///< there is a surface where alpha is at least the cut-off
+  blend,   ///< there is a surface where alpha is above 0
+};
+
+struct MeshMaterial {
+  std::string name;
+  glm::vec4 color{1, 1, 1, 1};  ///< linear light and alpha, 0..1; multiplies the texture
+  int32_t texture = -1;         ///< index into Mesh::textures, or -1
+  TextureWrap wrap_u = TextureWrap::repeat, wrap_v = TextureWrap::repeat;
+  AlphaMode alpha_mode = AlphaMode::opaque;
+  float alpha_cutoff = 0.5f;
+};
+
+struct MeshTriangle {
+  std::array<uint32_t, 3> vertices{};
+  uint32_t material = 0;
+};
+
+/// A scene in one coordinate system. The memory counts against ctx.memory, which must outlive the mesh.
+struct Mesh {
+  std::vector<glm::dvec3> positions;  ///< finite; in the unit of the file
+  /// Texture coordinates of the vertices, or none: (0, 0) is the top left corner of a texture, (1, 1) the
+  /// bottom right one. Finite.
+  std::vector<glm::vec2> uvs;
+  std::vector<glm::vec4> colors;        ///< of the vertices, or none: linear light and alpha, 0..1
+  std::vector<MeshTriangle> triangles;  ///< all of them have an area
+  std::vector<MeshMaterial> materials;
+  std::vector<Texture> textures;
+  std::vector<Reservation> memory;
+};
+
+/// Whether a name ends like a mesh: .obj, .gltf, .glb or .ply.
+bool is_mesh_name(const std::string& name);
+
+/// Reads a mesh: the triangles of all nodes of the scene in their places, polygons split, points and lines
+/// left out, triangles without area dropped. Base colours of .obj and colours of .ply and .obj vertices are
+/// taken as sRGB, those of glTF as linear light, as their specifications or usual writers have it. Materials
+/// of .obj whose texture or opacity map has alpha are masks with a cut-off of 0.5.
+///
+/// A .ply file without faces is no mesh but points (point_cloud.h): ErrorCode::input.
+///
+/// A texture, a material library or a buffer that the mesh names and that is not there is an error, since the
+/// colours would be wrong in silence. Errors: ErrorCode::input, ErrorCode::limit.
+Result<Mesh> read_mesh(const std::string& path, Context& ctx);
+
+}  // namespace voxkit

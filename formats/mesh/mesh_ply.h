@@ -1,0 +1,18 @@
+// Meshes in PLY files, by our own reader: assimp's trusts what they say.
+#pragma once
+
+#include <string>
+
+#include "formats/mesh/mesh_parts.h"
+
+namespace voxkit {
+
+/// Reads a .ply file (Greg Turk, "The PLY polygon file format", 1994): ASCII and binary of either byte order.
+/// Vertices have x, y, z; red, green, blue and alpha; s and t, u and v or texture_u and texture_v, which
+/// count from the bottom. Faces have vertex_indices or vertex_index, and, as MeshLab writes them, a list
+/// texcoord of two numbers a corner; a `comment TextureFile` names the texture. Polygons become fans of
+/// triangles. Other elements and properties are passed over. Errors:
+/// ErrorCode::input, ErrorCode::limit.
+Result<MeshParts> read_ply(const std::string& path, Context& ctx);
+
+}  // namespace voxkit

@@ -1,0 +1,103 @@
+#include "formats/volume/dense_sink.h"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cstring>
+
+namespace voxkit {
+namespace {
+
+constexpr size_t buffer_bytes = size_t{1} << 20;
+
+}  // namespace
+
+SampleLayout storage_layout(const VolumeInfo& info) {
+  if (is_colour(info.format)) return {SampleType::u8, attributes(info.format), false};
+  if (info.format == VoxelFormat::float32) return {SampleType::f32, 1, false};
+  if (scalar_format(info.sample_type) == info.format) return {info.sample_type, 1, false};
+  if (info.format == VoxelFormat::density16) return {SampleType::u16, 1, false};
+  return {info.format == VoxelFormat::bitmap ? SampleType::bit : SampleType::u8, 1, false};
+}
+
+DenseSink::DenseSink(std::unique_ptr<OutputFile> file, const VolumeInfo& info, const SampleLayout& layout)
+    : file_(std::move(file)), info_(info), layout_(layout), buffer_(buffer_bytes) {}
+
+Status DenseSink::write(int64_t z0, int64_t z1, ConstVoxelSpan voxels) {
+  if (z0 != next_z_ || z1 < z0 || z1 > info_.dims.z)
+    return fail(
+        ErrorCode::internal, file_->name(),
+        fmt::format("slices {} to {} written: expected slices from {} of {}", z0, z1, next_z_, info_.dims.z));
+  const int64_t bytes = voxel_bytes(info_.format);
+  const Index3 size = info_.dims;
+  const bool whole_slices = voxels.row_stride == size.x * bytes;
+  const bool whole_slab = whole_slices && voxels.slice_stride == size.x * size.y * bytes;
+  if (whole_slab) {
+    VOX_CHECK(put_voxels(voxels.data, size.x * size.y * (z1 - z0)));
+  } else {
+    for (int64_t z = 0; z < z1 - z0; ++z) {
+      if (whole_slices) {
+        VOX_CHECK(put_voxels(voxels.row(0, z), size.x * size.y));
+        continue;
+      }
+      for (int64_t y = 0; y < size.y; ++y) VOX_CHECK(put_voxels(voxels.row(y, z), size.x));
+    }
+  }
+  next_z_ = z1;
+  return {};
+}
+
+Status DenseSink::put_voxels(const std::byte* voxels, int64_t count) {
+  const int64_t in_bytes = voxel_bytes(info_.format);
+  if (layout_.type == SampleType::bit) {
+    size_t filled = 0;
+    for (int64_t i = 0; i < count;) {
+      if (bit_count_ == 0 && i + 8 <= count) {
+        // Moves bit 0 of byte k to bit 56 + k, and from there down.
+        uint64_t eight;
+        std::memcpy(&eight, voxels + i, 8);
+        bits_ = static_cast<std::byte>((eight & 0x0101010101010101) * 0x0102040810204080 >> 56);
+        bit_count_ = 8;
+        i += 8;
+      } else {
+        bits_ |= (voxels[i++] & std::byte{1}) << bit_count_++;
+      }
+      if (bit_count_ < 8) continue;
+      buffer_[filled++] = bits_;
+      bits_ = std::byte{0};
+      bit_count_ = 0;
+      if (filled == buffer_.size()) {
+        VOX_CHECK(put(buffer_));
+        filled = 0;
+      }
+    }
+    return put(std::span(buffer_).first(filled));
+  }
+  const bool as_it_is =
+      storage_bias(layout_.type) == 0;  // samples of such types lie in files as they do in memory
+  const int64_t batch =
+      as_it_is ? std::max<int64_t>(count, 1) : static_cast<int64_t>(buffer_.size()) / in_bytes;
+  for (int64_t done = 0; done < count; done += batch) {
+    const int64_t n = std::min(batch, count - done);
+    const std::byte* from = voxels + done * in_bytes;
+    if (!as_it_is) {
+      // Adding the bias turns the sign bit over, and so does taking it away: conversion is its own inverse.
+      convert_samples(from, layout_, n, info_.format, buffer_.data());
+      from = buffer_.data();
+    }
+    VOX_CHECK(put({from, static_cast<size_t>(n * layout_.bytes_per_voxel())}));
+  }
+  return {};
+}
+
+Status DenseSink::finish() {
+  if (next_z_ != info_.dims.z)
+    return fail(ErrorCode::internal, file_->name(),
+                fmt::format("{} slices written: expected {}", next_z_, info_.dims.z));
+  if (bit_count_ > 0) VOX_CHECK(put({&bits_, 1}));
+  VOX_CHECK(complete());
+  VOX_CHECK(file_->commit());
+  return committed();
+}
+
+}  // namespace voxkit

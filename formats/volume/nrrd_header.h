@@ -1,0 +1,73 @@
+// The text header of NRRD files: what nrrd.cc reads and writes before the samples.
+#pragma once
+
+#include <charconv>
+#include <cstdint>
+#include <map>
+#include <optional>
+#include <string>
+#include <string_view>
+#include <vector>
+
+#include "formats/input_stream.h"
+#include "formats/result.h"
+#include "formats/volume.h"
+#include "formats/volume/dense_source.h"
+
+namespace voxkit::nrrd {
+
+/// ASCII letters in lower case; the format's names do not depend on case.
+std::string lower(std::string_view s);
+/// What stands between blanks and tabs.
+std::vector<std::string_view> words(std::string_view s);
+/// A number that takes up all of `s`; nothing where there is none, or where T does not hold it.
+template <class T>
+std::optional<T> number(std::string_view s) {
+  T value{};
+  const auto [end, error] = std::from_chars(s.data(), s.data() + s.size(), value);
+  if (error != std::errc{} || end != s.data() + s.size()) return std::nullopt;
+  return value;
+}
+
+/// The value of a field or of a key, and the line it is on.
+struct Field {
+  std::string value;
+  int line = 0;
+};
+using Fields = std::map<std::string, Field>;
+
+/// The header as lines.
+struct Header {
+  std::string name;                 ///< of the file, for messages
+  Fields fields;                    ///< by name in lower case without spaces
+  Fields keys;                      ///< key/value pairs
+  std::vector<std::string> listed;  ///< file names after `data file: LIST`
+
+  const Field* find(const std::string& field) const {
+    const auto it = fields.find(field);
+    return it == fields.end() ? nullptr : &it->second;
+  }
+  /// The error that a field is not what is expected, or not there.
+  tl::unexpected<Error> wrong(const std::string& field, const std::string& expected) const;
+};
+
+enum class Encoding { raw, gzip, bzip2, text };
+
+/// What the header means.
+struct Nrrd {
+  VolumeInfo info;
+  SampleLayout layout;
+  Encoding encoding = Encoding::raw;
+  int64_t line_skip = 0, byte_skip = 0;  ///< byte_skip -1: the data are the last bytes of the file
+  int dimension = 0;
+  std::vector<int64_t> sizes;
+  uint64_t bytes = 0;  ///< of all samples
+};
+
+/// Reads up to the blank line or, where the data are in other files, to the end. At most 16 MiB.
+Result<Header> read_header(InputStream& stream);
+Result<Nrrd> interpret(const Header& header);
+/// The header to write: raw little-endian samples after it or, if it is not empty, in `data_file`.
+std::string header_text(const VolumeInfo& info, const SampleLayout& layout, const std::string& data_file);
+
+}  // namespace voxkit::nrrd

@@ -1,0 +1,138 @@
+#include "formats/volume/open_volume.h"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <array>
+#include <filesystem>
+#include <fstream>
+#include <string_view>
+#include <vector>
+
+#include "formats/output_file.h"
+#include "formats/volume/readers.h"
+
+namespace voxkit {
+namespace {
+
+namespace fs = std::filesystem;
+
+/// Kinds of volume that a name can mean.
+enum class Kind { none, nrrd, nifti, mrc, raw, vdb, image };
+
+struct Ending {
+  std::string_view text;
+  Kind kind;
+};
+constexpr Ending endings[] = {
+    {".nrrd", Kind::nrrd}, {".nhdr", Kind::nrrd}, {".nii", Kind::nifti}, {".nii.gz", Kind::nifti},
+    {".mrc", Kind::mrc},   {".map", Kind::mrc},   {".ccp4", Kind::mrc},  {".rec", Kind::mrc},
+    {".raw", Kind::raw},   {".vdb", Kind::vdb},   {".tif", Kind::image}, {".tiff", Kind::image},
+    {".png", Kind::image}, {".exr", Kind::image},
+};
+
+Kind kind_of(const std::string& name) {
+  for (const Ending& ending : endings)
+    if (has_ending(name, ending.text)) return ending.kind;
+  return Kind::none;
+}
+
+/// Whether a folder holds DICOM slices: its first files by name tell, more than one so that a note among them
+/// does no harm.
+Result<bool> holds_dicom(const std::string& folder) {
+  constexpr size_t looked_at = 16;
+  std::error_code error;
+  std::vector<std::string> first;
+  for (fs::directory_iterator it(folder, error), end; !error && it != end; it.increment(error)) {
+    std::error_code unreadable;
+    const std::string name = it->path().filename().string();
+    if (name.front() == '.' || !it->is_regular_file(unreadable)) continue;
+    first.insert(std::upper_bound(first.begin(), first.end(), name), name);
+    if (first.size() > looked_at) first.pop_back();
+  }
+  if (error) return bad_input(folder, error.message());
+  for (const std::string& name : first) {
+    if (has_ending(name, ".dcm")) return true;
+    std::ifstream file(fs::path(folder) / name, std::ios::binary);
+    std::array<char, 132> head{};
+    if (file.read(head.data(), head.size()) && std::string_view(head.data() + 128, 4) == "DICM") return true;
+  }
+  return false;
+}
+
+auto unknown_output(const std::string& name) {
+  return fail(ErrorCode::usage, name,
+              "unknown kind of volume: expected one of .nrrd .nhdr .nii .nii.gz .vdb .raw .mrc .map .ccp4 "
+              ".rec, or a pattern "
+              "of images such as slice-%04d.tif");
+}
+
+}  // namespace
+
+Result<std::unique_ptr<VolumeSource>> open_volume(const std::string& name, const OpenOptions& options,
+                                                  Context& ctx) {
+  if (name == "-") return open_nrrd(name, ctx);
+  if (is_builtin(name)) return open_builtin(name);
+  std::error_code error;
+  const fs::file_status status = fs::status(name, error);
+  if (!fs::exists(status)) {
+    if (is_numbered(name)) return open_image_stack(name, ctx);
+    return bad_input(name, error ? error.message() : "No such file or directory");
+  }
+  if (fs::is_directory(status)) {
+    VOX_TRY(const bool dicom, holds_dicom(name));
+    return dicom ? open_dicom(name, ctx) : open_image_stack(name, ctx);
+  }
+  switch (kind_of(name)) {
+    case Kind::nrrd:
+      return open_nrrd(name, ctx);
+    case Kind::nifti:
+      return open_nifti(name, ctx);
+    case Kind::mrc:
+      return open_mrc(name, ctx);
+    case Kind::raw:
+      return open_raw(name, options, ctx);
+    case Kind::vdb:
+      return open_vdb(name, options.grid, ctx);
+    case Kind::image:
+      return open_image_stack(name, ctx);
+    case Kind::none:
+      break;
+  }
+  return bad_input(
+      name,
+      "unknown kind of volume: expected one of .nrrd .nhdr .nii .nii.gz .vdb .raw .mrc .map .ccp4 .rec, "
+      "images "
+      "(.tif .png .exr, a folder or a pattern), a folder of DICOM slices, or a built-in such as menger:5");
+}
+
+Result<std::unique_ptr<VolumeSink>> create_volume(const std::string& name, const VolumeInfo& info, bool force,
+                                                  Context& ctx) {
+  if (!checked_voxels(info.dims))
+    return fail(ErrorCode::internal, name, "the volume to write has no voxels, or too many");
+  if (name == "-") return create_nrrd(name, info, force, ctx);
+  switch (kind_of(name)) {
+    case Kind::nrrd:
+      return create_nrrd(name, info, force, ctx);
+    case Kind::nifti:
+      return create_nifti(name, info, force, ctx);
+    case Kind::mrc:
+      return create_mrc(name, info, force, ctx);
+    case Kind::raw:
+      return create_raw(name, info, force, ctx);
+    case Kind::vdb:
+      return create_vdb(name, info, force, ctx);
+    case Kind::image:
+      return create_image_stack(name, info, force, ctx);
+    case Kind::none:
+      break;
+  }
+  return unknown_output(name);
+}
+
+Status check_volume_output(const std::string& name, bool force) {
+  if (name != "-" && kind_of(name) == Kind::none) return unknown_output(name);
+  return kind_of(name) == Kind::image ? Status{} : check_output(name, force);
+}
+
+}  // namespace voxkit

@@ -1,0 +1,177 @@
+// Reading a DAG, wherever its words are: in memory, in a mapped file, on a device. Safe on any words: a
+// pointer that leads outside is never followed.
+#pragma once
+
+#include <algorithm>
+#include <array>
+#include <bit>
+#include <cstdint>
+
+#include "formats/hd.h"
+#include "libcolor/dag/dag.h"
+#include "libcolor/surface/surface.h"
+
+namespace voxkit::color {
+
+/// A node that has been looked up.
+struct NodeRef {
+  const uint32_t* words = nullptr;  ///< null: there is none
+  uint32_t mask = 0;
+
+  VOX_HD bool has(uint32_t octant) const { return mask >> octant & 1; }
+  /// Which of the children an octant is.
+  VOX_HD uint32_t number(uint32_t octant) const { return count_octants(mask & ((1u << octant) - 1)); }
+};
+
+/// A child on the way down.
+struct ChildRef {
+  uint32_t pointer = 0;
+  uint64_t colors_before = 0;  ///< of the node's, before the child's first one
+};
+
+struct DagView {
+  int height = leaf_height;
+  Colors colors = Colors::leaf;
+  Counts counts = Counts::node;
+  Curve curve = Curve::morton;
+  uint32_t root = 0;
+  const uint64_t* leaves = nullptr;
+  uint64_t leaf_count = 0;
+  std::array<const uint32_t*, most_levels + 1> nodes{};  ///< by height
+  std::array<uint64_t, most_levels + 1> words{};
+
+  /// The leaf word with this number; 0 if there is none.
+  VOX_HD uint64_t leaf(uint32_t pointer) const { return pointer < leaf_count ? leaves[pointer] : 0; }
+
+  /// The node of this height, above leaf_height, that begins at a word.
+  VOX_HD NodeRef node(int h, uint32_t pointer) const {
+    const auto at = static_cast<size_t>(h);
+    if (pointer >= words[at]) return {};
+    const uint32_t* const first = nodes[at] + pointer;
+    const uint32_t mask = *first & 0xff;
+    const uint32_t length = node_words(count_octants(mask), *first >> 8 == wide_count, counts);
+    if (length > words[at] - pointer) return {};
+    return {first, mask};
+  }
+
+  /// How many colours there are in a subtree of this height.
+  VOX_HD uint64_t colors_below(int h, uint32_t pointer) const {
+    if (h == leaf_height) return leaf_colors(leaf(pointer), colors);
+    const auto at = static_cast<size_t>(h);
+    if (pointer >= words[at]) return 0;
+    const uint32_t* const first = nodes[at] + pointer;
+    const uint32_t count = *first >> 8;
+    if (count != wide_count) return count;
+    const NodeRef ref = node(h, pointer);
+    if (ref.words == nullptr) return 0;
+    const uint32_t* const wide = first + 1 + count_octants(ref.mask);
+    return wide[0] | static_cast<uint64_t>(wide[1]) << 32;
+  }
+
+  /// The pointer to a node's child number i, of those that are there.
+  VOX_HD uint32_t pointer(const NodeRef& node, uint32_t i) const {
+    return node.words[1 + (counts == Counts::pointer ? 2 * i : i)];
+  }
+
+  /// The child in an octant that is there, of a node of this height that is gone through in a state.
+  ChildRef child(const NodeRef& node, int h, uint32_t octant, OrderState state) const {
+    const uint32_t number = node.number(octant);
+    if (counts == Counts::pointer) return {pointer(node, number), node.words[2 + 2 * number]};
+    uint64_t before = colors == Colors::all ? 1 : 0;
+    for (uint32_t left = node.mask & octant_orders.before[state][octant]; left != 0; left &= left - 1)
+      before +=
+          colors_below(h - 1, pointer(node, node.number(static_cast<uint32_t>(std::countr_zero(left)))));
+    return {pointer(node, number), before};
+  }
+};
+
+/// A DAG in memory, as a view of it.
+inline DagView view_of(const Dag& dag) {
+  DagView view;
+  view.height = dag.height;
+  view.colors = dag.colors;
+  view.counts = dag.counts;
+  view.curve = dag.curve;
+  view.root = dag.root;
+  view.leaves = dag.leaves.data();
+  view.leaf_count = dag.leaves.size();
+  for (size_t h = 0; h < dag.nodes.size(); ++h) {
+    view.nodes[h] = dag.nodes[h].data();
+    view.words[h] = dag.nodes[h].size();
+  }
+  return view;
+}
+
+/// The number, among the colours of a leaf word with Colors::all, of that of the cell of height 0 to 2 around
+/// voxel `bit`.
+inline uint32_t leaf_cell_index(uint64_t leaf, uint32_t bit, int height, OrderState state) {
+  if (height == leaf_height) return 0;
+  if (height == 0) return leaf_index(leaf, bit, Colors::all, state);
+  const uint32_t octant = bit >> 3;
+  const uint32_t first = 8 * octant + octant_orders.octant[octant_orders.next[state][octant]][0];
+  const uint64_t before = leaf & octant_orders.voxels_before[state][first];
+  return 1 + static_cast<uint32_t>(std::popcount(before)) + count_octants(leaf_octants(before));
+}
+
+/// Whether there is a voxel in the cell of some height, 0 for the voxel itself, around a place, a Morton code
+/// inside the grid, and if so which colour the cell has. Above 0 only with Colors::all.
+struct Found {
+  bool there = false;
+  uint64_t color = 0;
+};
+
+/// Finds cells one after the other: keeps the way to the last one, most of which is that to its neighbours.
+class CellFinder {
+ public:
+  explicit CellFinder(const DagView& view) : view_(view), lowest_(view.height) {
+    path_[static_cast<size_t>(view.height)] = {view.root, first_state(view.curve), 0};
+  }
+
+  Found find(uint64_t place, int height) {
+    // Nodes of this height and above are those of the last place.
+    const int common = (static_cast<int>(std::bit_width(place ^ place_)) + 2) / 3;
+    place_ = place;
+    for (int h = std::max({lowest_, common, height}); h > leaf_height; --h) {
+      lowest_ = h;
+      const Step at = path_[static_cast<size_t>(h)];
+      const auto octant = static_cast<uint32_t>(place >> 3 * (h - 1) & 7);
+      const NodeRef node = view_.node(h, at.pointer);
+      if (node.words == nullptr) return {};
+      if (h == height) return {true, at.color};
+      if (!node.has(octant)) return {};
+      const ChildRef child = view_.child(node, h, octant, at.state);
+      path_[static_cast<size_t>(h) - 1] = {child.pointer, octant_orders.next[at.state][octant],
+                                           at.color + child.colors_before};
+    }
+    lowest_ = leaf_height;
+    const Step at = path_[leaf_height];
+    const auto bit = static_cast<uint32_t>(place & 63);
+    const uint64_t leaf = view_.leaf(at.pointer);
+    const int shift = 3 * height, width = 1 << shift;
+    const uint64_t cell =
+        height >= leaf_height ? leaf : leaf >> (bit >> shift << shift) & ((uint64_t{1} << width) - 1);
+    if (cell == 0) return {};
+    return {true, at.color + (height == 0 ? leaf_index(leaf, bit, view_.colors, at.state)
+                                          : leaf_cell_index(leaf, bit, height, at.state))};
+  }
+
+ private:
+  struct Step {
+    uint32_t pointer;
+    OrderState state;
+    uint64_t color;  ///< the first one of the node
+  };
+  const DagView& view_;
+  std::array<Step, most_levels + 1> path_;  ///< by height, down to `lowest_`
+  uint64_t place_ = 0;
+  int lowest_;
+};
+
+inline Found find_cell(const DagView& view, uint64_t place, int height) {
+  return CellFinder(view).find(place, height);
+}
+inline Found find_voxel(const DagView& view, uint64_t place) {
+  return find_cell(view, place, 0);
+}
+
+}  // namespace voxkit::color

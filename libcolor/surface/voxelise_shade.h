@@ -1,0 +1,86 @@
+// The colour of a triangle at a voxel.
+#pragma once
+
+#include <array>
+#include <cstdint>
+#include <vector>
+
+#include "formats/mesh/mesh.h"
+#include "libcolor/surface/surface.h"
+#include "libcolor/surface/texture_levels.h"
+#include "libcolor/surface/triangle_cells.h"
+
+namespace voxkit::color {
+
+/// A mesh on the grid of a surface.
+struct VoxelScene {
+  SurfaceKind kind = SurfaceKind::thin;
+  std::vector<SnappedTriangle> corners;  ///< of mesh.triangles
+  Mesh mesh;                             ///< without its textures and positions
+  std::vector<TextureLevels> textures;
+  std::vector<int32_t> texture_of;  ///< of a material: index into textures, or -1
+};
+
+/// Linear light in 16 bits, and how much of the area is there, 1..255; 0 = nothing is. In one register: parts
+/// of a word that are written one by one wait for each other when it is read.
+class Shade {
+ public:
+  Shade() = default;
+  Shade(uint16_t r, uint16_t g, uint16_t b, uint8_t cover)
+      : bits_(uint64_t{cover} << 48 | uint64_t{b} << 32 | uint32_t{g} << 16 | r) {}
+  uint8_t cover() const { return static_cast<uint8_t>(bits_ >> 48); }
+  uint16_t light(size_t channel) const { return static_cast<uint16_t>(bits_ >> (16 * channel)); }
+
+ private:
+  uint64_t bits_ = 0;
+};
+
+/// What is the same for all voxels of a triangle. Places are counted in voxels from `lo`.
+class TriangleShade {
+ public:
+  TriangleShade(const VoxelScene& scene, uint32_t triangle, const std::array<int32_t, 3>& lo);
+
+  /// At the point of the triangle that is nearest to the centre of a voxel, or beside its border close to
+  /// that.
+  Shade at(int x, int y, int z) const;
+
+  /// Area of the part of the triangle that is in a voxel, in squares of its edge; 1.3 at most.
+  double area_in(int x, int y, int z) const;
+
+ private:
+  using Place = std::array<double, 3>;
+  Shade shade(Float4 texel, Float4 tint) const;
+  std::array<Place, 3> corners_{};
+  Place gradient_[2];                           ///< of the weights of the second and the third corner
+  double weight_[2] = {0, 0};                   ///< at the first corner
+  double u_[3] = {0, 0, 0}, v_[3] = {0, 0, 0};  ///< at the first corner, and from there to the others
+  const MeshMaterial* material_;
+  const TextureLevels* texture_ = nullptr;
+  TextureLevels::Detail detail_;
+  bool tinted_ = false;  ///< has colours at its corners
+  Float4 tint_[3];
+  Shade plain_;  ///< where it is the same everywhere
+};
+
+/// The mean over the triangles in a voxel.
+class ShadeMean {
+ public:
+  void add(const Shade& shade, double area) {
+    // Whatever is there counts; order does not matter.
+    const uint64_t weight = (1 + static_cast<uint64_t>(area * 65536)) * shade.cover();
+    weight_ += weight;
+    for (size_t c = 0; c < 3; ++c) light_[c] += static_cast<unsigned __int128>(weight) * shade.light(c);
+  }
+  bool empty() const { return weight_ == 0; }
+  std::array<uint16_t, 3> light() const {
+    std::array<uint16_t, 3> out;
+    for (size_t c = 0; c < 3; ++c) out[c] = static_cast<uint16_t>((light_[c] + weight_ / 2) / weight_);
+    return out;
+  }
+
+ private:
+  unsigned __int128 weight_ = 0;
+  std::array<unsigned __int128, 3> light_{};
+};
+
+}  // namespace voxkit::color

@@ -1,0 +1,187 @@
+// The work of one pixel, on the host or a device (thesis sections 3.2.1 to 3.2.5).
+#pragma once
+
+#include <bit>
+#include <cmath>
+#include <type_traits>
+
+#include "librender/cast/grid.h"
+#include "librender/cast/opacity.h"
+#include "librender/cast/ray.h"
+#include "librender/pixel.h"
+
+namespace voxkit::render {
+
+/// What all pixels of a picture share.
+struct CastParams {
+  int width, height;
+  int left, top, right, bottom;  ///< pixels outside of left <= x < right, top <= y < bottom see nothing
+  int64_t dims[3];               ///< of the grid
+  double origin[3];              ///< the eye in grid coordinates
+  RayOrigin start;               ///< the same
+  double corner[3], across[3], down[3];  ///< direction at (x, y): corner + x * across + y * down
+  double pixel;                          ///< width of a pixel at distance 1 along the axis
+  double edge;                           ///< smallest edge of a voxel, world units
+  double cone;                           ///< width of a pixel at distance 1 in voxels; 0: all detail
+  bool skip;                             ///< step over cells, not voxels
+  ColourOf colour_of;
+};
+constexpr float opaque = 0.995f;
+
+/// The direction through a pixel's centre in grid coordinates; t = 1 is where it is 1 away along the axis.
+struct PixelRay {
+  double direction[3];
+};
+VOX_HD_HOT PixelRay ray_through(const CastParams& params, int x, int y) {
+  PixelRay ray;
+  const double u = x + 0.5, v = y + 0.5;
+  for (int a = 0; a < 3; ++a)
+    ray.direction[a] = params.corner[a] + (params.across[a] * u + params.down[a] * v);
+  return ray;
+}
+/// The length of that in the world.
+VOX_HD_HOT double world_length(const CastParams& params, int x, int y) {
+  const double right = (x + 0.5 - params.width * 0.5) * params.pixel,
+               up = (y + 0.5 - params.height * 0.5) * params.pixel;
+  return std::sqrt(1 + (right * right + up * up));
+}
+
+/// Front-to-back blending of `length` base voxels of one colour; true when the ray has become opaque.
+VOX_HD_HOT bool blend(const Colour& colour, double length, Pixel& pixel) {
+  const float alpha = static_cast<float>(coverage(static_cast<double>(colour.alpha), length));
+  const float weight = alpha * (1 - pixel.colour[3]);
+  for (int k = 0; k < 3; ++k) pixel.colour[k] += weight * colour.rgb[k];
+  pixel.colour[3] += weight;
+  return pixel.colour[3] >= opaque;
+}
+
+/// Keeps where the first voxel that is not void was entered.
+VOX_HD_HOT void found(const uint32_t (&voxel)[3], double distance, Pixel& pixel, PixelDetail& detail) {
+  pixel.distance = static_cast<float>(distance);
+  for (int a = 0; a < 3; ++a) detail.voxel[a] = static_cast<int32_t>(voxel[a]);
+}
+
+/// Follows a ray over the cells of a grid, from the voxel that it is in. Nothing was found so far.
+template <class Cursor>
+VOX_HD_HOT void follow(const CastParams& params, GridRay& ray, Cursor& cursor, int x, int y, Pixel& pixel,
+                       PixelDetail& detail) {
+  const double length = world_length(params, x, y);
+  const double cone = params.cone * length;
+  for (bool inside = true; inside;) {
+    // Voxels as wide as the cone, or less, are fine enough: floor(log2(width)).
+    const double width = cone * ray.t();
+    const int finest = width >= 2 ? static_cast<int>(std::bit_cast<uint64_t>(width) >> 52) - 1023 : -1;
+    const uint32_t voxel[3] = {ray.voxel(0), ray.voxel(1), ray.voxel(2)};
+    const auto cell = cursor.locate(voxel[0], voxel[1], voxel[2], finest);
+    ++detail.cells;
+    if (params.colour_of.is_void(cell.value)) {
+      inside = params.skip ? cell.leave(ray) : ray.leave(0);
+      continue;
+    }
+    const double entered = ray.t();
+    if (detail.voxel[0] < 0) found(voxel, entered * length, pixel, detail);
+    const Colour colour = params.colour_of(cell.value);
+    if (colour.alpha < 1) inside = params.skip ? cell.leave(ray) : ray.leave(0);  // opaque: not left
+    if (blend(colour, (ray.t() - entered) * length / params.edge, pixel)) break;
+  }
+}
+
+/// Algorithm 1 of the thesis as it is published: floats, accumulated from voxel to voxel.
+VOX_HD_HOT void follow_baseline(const CastParams& params, DenseView::Cursor& cursor, int x, int y,
+                                Pixel& pixel, PixelDetail& detail) {
+  const PixelRay through = ray_through(params, x, y);
+  const double length = world_length(params, x, y);
+  const int64_t(&dims)[3] = params.dims;
+  float o[3], d[3], delta[3], t_max[3], t_enter = 0, t_leave = __builtin_inff();
+  for (int a = 0; a < 3; ++a) {
+    o[a] = static_cast<float>(params.origin[a]);
+    d[a] = static_cast<float>(through.direction[a]);
+    const float side = static_cast<float>(dims[a]);
+    if (d[a] == 0 && (o[a] < 0 || o[a] >= side)) return;
+    if (d[a] == 0) continue;
+    const float near = (d[a] < 0 ? side - o[a] : -o[a]) / d[a], far = (d[a] < 0 ? -o[a] : side - o[a]) / d[a];
+    t_enter = near > t_enter ? near : t_enter;
+    t_leave = far < t_leave ? far : t_leave;
+  }
+  if (t_enter >= t_leave) return;
+  int64_t voxel[3], step[3];
+  for (int a = 0; a < 3; ++a) {
+    const float at = o[a] + d[a] * t_enter;
+    const int64_t whole = static_cast<int64_t>(std::floor(at));
+    voxel[a] = whole < 0 ? 0 : whole >= dims[a] ? dims[a] - 1 : whole;
+    step[a] = d[a] < 0 ? -1 : 1;
+    delta[a] = d[a] == 0 ? __builtin_inff() : std::fabs(1 / d[a]);
+    t_max[a] =
+        d[a] == 0 ? delta[a] : t_enter + (static_cast<float>(voxel[a] + (d[a] < 0 ? 0 : 1)) - at) / d[a];
+  }
+  for (float t = t_enter;;) {
+    const Cell cell = cursor.locate(static_cast<uint32_t>(voxel[0]), static_cast<uint32_t>(voxel[1]),
+                                    static_cast<uint32_t>(voxel[2]), -1);
+    ++detail.cells;
+    const int axis = t_max[0] <= t_max[1] ? (t_max[0] <= t_max[2] ? 0 : 2) : (t_max[1] <= t_max[2] ? 1 : 2);
+    const float entered = t;
+    t = t_max[axis];
+    if (!params.colour_of.is_void(cell.value)) {
+      if (detail.voxel[0] < 0) {
+        pixel.distance = static_cast<float>(static_cast<double>(entered) * length);
+        for (int a = 0; a < 3; ++a) detail.voxel[a] = static_cast<int32_t>(voxel[a]);
+      }
+      const double crossed = static_cast<double>(t - entered) * length / params.edge;
+      if (blend(params.colour_of(cell.value), crossed, pixel)) break;
+    }
+    t_max[axis] += delta[axis];
+    voxel[axis] += step[axis];
+    if (voxel[axis] < 0 || voxel[axis] >= dims[axis]) break;
+  }
+}
+
+/// Chooses Algorithm 1.
+struct BaselineView {
+  DenseView dense;
+  struct Cursor : DenseView::Cursor {};
+  VOX_HD_HOT Cursor cursor() const { return {dense.cursor()}; }
+};
+
+/// The pixel (x, y) of any view.
+template <class Cursor>
+VOX_HD_HOT void cast_ray(const CastParams& params, Cursor& cursor, int x, int y, Pixel& pixel,
+                         PixelDetail& detail) {
+  if constexpr (std::is_same_v<Cursor, BaselineView::Cursor>) {
+    follow_baseline(params, cursor, x, y, pixel, detail);
+  } else {
+    GridRay ray(params.start, ray_through(params, x, y).direction);
+    if (!ray.enter()) return;
+    follow(params, ray, cursor, x, y, pixel, detail);
+  }
+}
+
+/// A block of threads is this many pixels wide and high.
+constexpr int block_width = 8, block_height = 8;
+/// Where a thread of a launch is.
+struct ThreadIndex {
+  unsigned block_x, block_y, thread_x, thread_y;
+};
+/// What a pixel cost, beside its cells.
+struct PixelCost {
+  uint32_t blocks, bytes;
+};
+
+/// The kernel: one thread a pixel. `pixels`, `details` and `costs` have width * height elements.
+template <class View>
+VOX_HD void cast_pixel(const CastParams& params, const View& view, ThreadIndex at, Pixel* pixels,
+                       PixelDetail* details, PixelCost* costs) {
+  const int x = static_cast<int>(at.block_x * block_width + at.thread_x),
+            y = static_cast<int>(at.block_y * block_height + at.thread_y);
+  if (x >= params.width || y >= params.height) return;
+  const int64_t i = int64_t{y} * params.width + x;
+  auto cursor = view.cursor();
+  const bool looked_at = x >= params.left && x < params.right && y >= params.top && y < params.bottom;
+  Pixel pixel;
+  PixelDetail detail;
+  if (looked_at) cast_ray(params, cursor, x, y, pixel, detail);
+  pixels[i] = pixel;
+  details[i] = detail;
+  costs[i] = {cursor.blocks(), cursor.bytes()};
+}
+
+}  // namespace voxkit::render
