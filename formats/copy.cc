@@ -108,8 +108,8 @@ uint64_t slab_target(const Context& ctx) {
 }
 
 Result<std::unique_ptr<Buffer>> Buffer::allocate(uint64_t bytes, const std::string& what, Context& ctx) {
-  VOX_CHECK(ctx.memory->reserve(bytes, what));
-  std::unique_ptr<Buffer> buffer(new Buffer(*ctx.memory, bytes));
+  VOX_TRY(Reservation reservation, Reservation::take(bytes, what, ctx));
+  std::unique_ptr<Buffer> buffer(new Buffer(std::move(reservation)));
   buffer->data_.reset(new (std::nothrow) std::byte[bytes]);
   if (!buffer->data_)
     return fail(ErrorCode::limit, {}, what + ": the system has no memory left: lower --max-memory");

@@ -6,8 +6,9 @@
 #include <functional>
 #include <memory>
 #include <string>
+#include <utility>
 
-#include "formats/context.h"
+#include "formats/reservation.h"
 #include "formats/source.h"
 
 namespace voxkit {
@@ -45,15 +46,11 @@ class Buffer {
  public:
   /// Fails with ErrorCode::limit, naming `what`.
   static Result<std::unique_ptr<Buffer>> allocate(uint64_t bytes, const std::string& what, Context& ctx);
-  ~Buffer() { budget_.release(bytes_); }
-  Buffer(const Buffer&) = delete;
-  Buffer& operator=(const Buffer&) = delete;
   std::byte* data() const { return data_.get(); }
 
  private:
-  Buffer(MemoryBudget& budget, uint64_t bytes) : budget_(budget), bytes_(bytes) {}
-  MemoryBudget& budget_;
-  uint64_t bytes_;
+  explicit Buffer(Reservation reservation) : reservation_(std::move(reservation)) {}
+  Reservation reservation_;
   std::unique_ptr<std::byte[]> data_;
 };
 

@@ -27,8 +27,14 @@ struct Error {
   std::string what;
 };
 
+/// A value, or the error that there is instead. Whoever is handed one looks at it: dropping it is a warning,
+/// and here warnings are errors. It is tl::expected in all else, which cannot be told so itself.
 template <class T>
-using Result = tl::expected<T, Error>;
+class [[nodiscard]] Result : public tl::expected<T, Error> {
+ public:
+  using tl::expected<T, Error>::expected;
+};
+/// Nothing, or an error.
 using Status = Result<void>;
 
 /// Control characters in `what`, which may quote a file, become '?': a message stays one line and harmless on

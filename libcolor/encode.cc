@@ -1,9 +1,9 @@
 // From a surface to a file: the DAG is built while colours are encoded, part by part.
 #include <fmt/format.h>
 
-#include <chrono>
 #include <cmath>
 
+#include "formats/clock.h"
 #include "formats/parallel.h"
 #include "formats/reservation.h"
 #include "libcolor/blocks/block_encode.h"
@@ -19,12 +19,6 @@
 
 namespace voxkit::color {
 namespace {
-
-using Clock = std::chrono::steady_clock;
-
-double seconds_since(Clock::time_point start) {
-  return std::chrono::duration<double>(Clock::now() - start).count();
-}
 
 /// Encodes and writes colours in their order, some parts at a time.
 class ColorWriter {

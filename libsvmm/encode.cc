@@ -13,6 +13,7 @@
 #include <utility>
 
 #include "formats/parallel.h"
+#include "formats/reservation.h"
 #include "libsvmm/encode_level.h"
 
 namespace voxkit::svmm {
@@ -96,24 +97,6 @@ class SlabReader {
   std::future<Status> pending_;  // last: its destructor waits for the reader, which uses the members above
 };
 
-/// Releases what it reserved.
-class Reservation {
- public:
-  explicit Reservation(MemoryBudget& budget) : budget_(budget) {}
-  ~Reservation() { budget_.release(bytes_); }
-  Reservation(const Reservation&) = delete;
-  Reservation& operator=(const Reservation&) = delete;
-  Status reserve(uint64_t bytes, const char* what) {
-    VOX_CHECK(budget_.reserve(bytes, what));
-    bytes_ += bytes;
-    return {};
-  }
-
- private:
-  MemoryBudget& budget_;
-  uint64_t bytes_ = 0;
-};
-
 Index3 min3(Index3 a, Index3 b) {
   return {std::min(a.x, b.x), std::min(a.y, b.y), std::min(a.z, b.z)};
 }
@@ -176,16 +159,16 @@ class Encoder {
     if (slice > uint64_t{1} << 50 || edge > uint64_t{1} << 20)
       return ctx_.memory->reserve(~uint64_t{0} >> 1, "encoding");
     if (source_.forward_only())
-      VOX_CHECK(reservation_.reserve(
-          2 * slice * std::min<uint64_t>(edge, static_cast<uint64_t>(info_.dims.z)) * bytes,
-          "two slabs of the input"));
+      VOX_CHECK(
+          reservation_.add(2 * slice * std::min<uint64_t>(edge, static_cast<uint64_t>(info_.dims.z)) * bytes,
+                           "two slabs of the input"));
     const uint64_t tile = edge * edge * edge * bytes;
     // A batch's blocks take at most about twice the voxels; its nodes are gone by then.
     const uint64_t w = levels_[0].blockwidth;
     const uint64_t nodes = edge * edge * edge / (w * w * w) * sizeof(Node<F>);
-    VOX_CHECK(reservation_.reserve(static_cast<uint64_t>(ctx_.threads) * (tile + 2 * nodes) +
-                                       static_cast<uint64_t>(batch_size(edge)) * 2 * tile,
-                                   "encoding tiles"));
+    VOX_CHECK(reservation_.add(static_cast<uint64_t>(ctx_.threads) * (tile + 2 * nodes) +
+                                   static_cast<uint64_t>(batch_size(edge)) * 2 * tile,
+                               "encoding tiles"));
     for (size_t j = tile_level_ + 1; j < levels_.size(); ++j) {
       const Index3 dims = levels_[j].dims;
       const uint64_t layers = std::min<uint64_t>(
@@ -194,7 +177,7 @@ class Encoder {
       if (__builtin_mul_overflow(static_cast<uint64_t>(dims.x) * static_cast<uint64_t>(dims.y),
                                  layers * sizeof(Node<F>), &total))
         total = ~uint64_t{0} >> 1;
-      VOX_CHECK(reservation_.reserve(total, "a slab of a mip-map level"));
+      VOX_CHECK(reservation_.add(total, "a slab of a mip-map level"));
     }
     return {};
   }
@@ -396,7 +379,7 @@ class Encoder {
     const Index3 dims = levels_[0].dims;
     uint64_t bytes = 0;
     if (__builtin_mul_overflow(levels_[0].block_bytes, 2u, &bytes)) bytes = ~uint64_t{0} >> 1;
-    VOX_CHECK(reservation_.reserve(bytes, "a volume that is all root level"));
+    VOX_CHECK(reservation_.add(bytes, "a volume that is all root level"));
     const size_t slab_bytes = static_cast<size_t>(dims.x * dims.y * 2 * voxel_bytes(F));
     std::vector<std::byte> voxels(slab_bytes), ordered(slab_bytes);
     BlockBuffer root;

@@ -3,10 +3,10 @@
 #include <fmt/format.h>
 
 #include <algorithm>
-#include <chrono>
 #include <cmath>
 #include <numeric>
 
+#include "formats/clock.h"
 #include "formats/reservation.h"
 #include "libvq/kmeans_assign.h"
 #include "libvq/kmeans_means.h"
@@ -15,12 +15,6 @@
 
 namespace voxkit::vq {
 namespace {
-
-using Clock = std::chrono::steady_clock;
-
-double seconds_since(Clock::time_point start) {
-  return std::chrono::duration<double>(Clock::now() - start).count();
-}
 
 Status validate(std::span<const Brick> bricks, std::span<const uint64_t> weights,
                 const KMeansOptions& options) {

@@ -16,6 +16,7 @@
 #include <vector>
 
 #include "formats/mapped_file.h"
+#include "formats/reservation.h"
 #include "formats/volume/openvdb_grids.h"
 #include "formats/volume/openvdb_tree.h"
 #include "formats/volume/volume_module.h"
@@ -134,10 +135,7 @@ class VdbSource : public VolumeSource {
  public:
   static SourceResult create(const std::string& path, typename Grid::Ptr grid, Context& ctx) {
     std::unique_ptr<VdbSource> source(new VdbSource);
-    const uint64_t bytes = grid->memUsage();
-    VOX_CHECK(ctx.memory->reserve(bytes, "the OpenVDB grid"));
-    source->memory_ = ctx.memory;
-    source->reserved_ = bytes;
+    VOX_TRY(source->memory_, Reservation::take(grid->memUsage(), "the OpenVDB grid", ctx));
     source->grid_ = grid;
     const openvdb::CoordBBox box = grid->evalActiveVoxelBoundingBox();
     auto& info = source->info_;
@@ -169,10 +167,6 @@ class VdbSource : public VolumeSource {
       if (std::isfinite(corner[axis])) info.origin[static_cast<size_t>(axis)] = corner[axis];
     }
     return source;
-  }
-
-  ~VdbSource() override {
-    if (reserved_) memory_->release(reserved_);
   }
 
   Status read(const Box& box, VoxelSpan out) override {
@@ -267,8 +261,7 @@ class VdbSource : public VolumeSource {
 
   typename Grid::ConstPtr grid_;
   Index3 min_{0};  ///< in the grid's index space, of our voxel (0, 0, 0)
-  MemoryBudget* memory_ = nullptr;
-  uint64_t reserved_ = 0;
+  Reservation memory_;
 };
 
 /// The grid of that name, or the first of a type that we read.
@@ -326,9 +319,7 @@ SourceResult open_grid(const std::string& path, const std::string& name, Context
     {
       const uint64_t bytes =
           entry.is_float() ? memory_of<openvdb::FloatTree>(tree) : memory_of<openvdb::Vec3STree>(tree);
-      VOX_CHECK(ctx.memory->reserve(bytes, "loading the OpenVDB grid"));
-      const auto release = [&](MemoryBudget* memory) { memory->release(bytes); };
-      const std::unique_ptr<MemoryBudget, decltype(release)> loading(ctx.memory, release);
+      VOX_TRY(const Reservation loading, Reservation::take(bytes, "loading the OpenVDB grid", ctx));
       archive.read_tree(stream, *grid);
     }
     if (const auto floats = openvdb::gridPtrCast<openvdb::FloatGrid>(grid))
@@ -355,7 +346,7 @@ class VdbSink : public VolumeSink {
 
  public:
   VdbSink(const VolumeInfo& info, std::unique_ptr<OutputFile> file, MemoryBudget* memory)
-      : info_(info), file_(std::move(file)), memory_(memory), grid_(Grid::create()) {
+      : info_(info), file_(std::move(file)), memory_(*memory), grid_(Grid::create()) {
     openvdb::math::Mat4d matrix = openvdb::math::Mat4d::identity();
     for (int axis = 0; axis < 3; ++axis) {
       const double spacing = info.spacing[static_cast<size_t>(axis)],
@@ -370,7 +361,6 @@ class VdbSink : public VolumeSink {
                                                                       static_cast<int>(info.dims.y),
                                                                       static_cast<int>(info.dims.z))));
   }
-  ~VdbSink() override { memory_->release(reserved_); }
 
   Status write(int64_t z0, int64_t z1, ConstVoxelSpan voxels) override {
     if (z0 != next_ || z1 < z0 || z1 > info_.dims.z)
@@ -415,8 +405,7 @@ class VdbSink : public VolumeSink {
   /// The leaf around a voxel, made where there is none.
   Result<Leaf*> leaf_at(const Coord& at) {
     if (Leaf* const leaf = grid_->tree().probeLeaf(at)) return leaf;
-    VOX_CHECK(memory_->reserve(leaf_bytes, "the OpenVDB grid"));
-    reserved_ += leaf_bytes;
+    VOX_CHECK(memory_.add(leaf_bytes, "the OpenVDB grid"));
     return grid_->tree().touchLeaf(at);
   }
   Status no_memory() const {
@@ -466,8 +455,7 @@ class VdbSink : public VolumeSink {
   static constexpr uint64_t leaf_bytes = sizeof(Leaf) + Leaf::SIZE * sizeof(Value) + 64;
   VolumeInfo info_;
   std::unique_ptr<OutputFile> file_;
-  MemoryBudget* memory_;
-  uint64_t reserved_ = 0;
+  Reservation memory_;
   typename Grid::Ptr grid_;
   int64_t next_ = 0;
 };

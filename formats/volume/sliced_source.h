@@ -8,7 +8,7 @@
 #include <mutex>
 #include <vector>
 
-#include "formats/context.h"
+#include "formats/reservation.h"
 #include "formats/source.h"
 
 namespace voxkit {
@@ -18,10 +18,6 @@ namespace voxkit {
 /// are read by rows.
 class SlicedSource : public VolumeSource {
  public:
-  ~SlicedSource() override {
-    if (reserved_) memory_->release(reserved_);
-  }
-
   Status read(const Box& box, VoxelSpan out) override {
     const int bytes = voxel_bytes(info_.format);
     const int64_t row_bytes = info_.dims.x * bytes;
@@ -52,17 +48,16 @@ class SlicedSource : public VolumeSource {
   /// Once info_ is known: decides how many slices to keep, at most an eighth of the memory budget and 64
   /// slices.
   void keep_slices(Context& ctx) {
-    memory_ = ctx.memory;
     const uint64_t slice_bytes =
         static_cast<uint64_t>(info_.dims.x * info_.dims.y * voxel_bytes(info_.format));
     // A thread may hold a slice that others have already pushed out.
     const uint64_t held = static_cast<uint64_t>(std::max(ctx.threads, 1));
-    const uint64_t room = memory_->limit() / 8 / slice_bytes;
+    const uint64_t room = ctx.memory->limit() / 8 / slice_bytes;
     if (room <= held) return;
     const uint64_t slots = std::min({room - held, uint64_t{64}, static_cast<uint64_t>(info_.dims.z)});
-    const uint64_t bytes = (slots + held) * slice_bytes;
-    if (!memory_->reserve(bytes, "keeping slices")) return;
-    reserved_ = bytes;
+    auto memory = Reservation::take((slots + held) * slice_bytes, "keeping slices", ctx);
+    if (!memory) return;
+    memory_ = std::move(*memory);
     slots_ = slots;
   }
 
@@ -99,8 +94,7 @@ class SlicedSource : public VolumeSource {
     return found;
   }
 
-  MemoryBudget* memory_ = nullptr;
-  uint64_t reserved_ = 0;
+  Reservation memory_;
   uint64_t slots_ = 0;
   std::mutex mutex_;
   std::list<std::shared_ptr<Slice>> recent_;  ///< most recent first

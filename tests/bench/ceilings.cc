@@ -4,7 +4,6 @@
 #include <array>
 #include <barrier>
 #include <bit>
-#include <chrono>
 #include <cstdint>
 #include <cstring>
 #include <functional>
@@ -13,6 +12,7 @@
 #include <thread>
 #include <vector>
 
+#include "formats/clock.h"
 #include "formats/cpu.h"
 #include "formats/hash.h"
 #include "tests/bench/thread_time.h"
@@ -30,7 +30,7 @@ void keep(const T& value) {
 }
 
 double wall_seconds() {
-  return std::chrono::duration<double>(std::chrono::steady_clock::now().time_since_epoch()).count();
+  return seconds_since({});
 }
 
 /// Seconds of the fastest round in which each of some threads does its work; they begin together.

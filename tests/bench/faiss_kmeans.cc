@@ -6,9 +6,10 @@
 #include <faiss/IndexFlat.h>
 #include <omp.h>
 
-#include <chrono>
 #include <cmath>
 #include <vector>
+
+#include "formats/clock.h"
 
 namespace voxkit::bench {
 
@@ -28,10 +29,10 @@ std::optional<FaissResult> faiss_kmeans(std::span<const vq::Brick> bricks, std::
   parameters.max_points_per_centroid = static_cast<int>(bricks.size());  // no samples
   faiss::Clustering clustering(static_cast<int>(width), static_cast<int>(codewords), parameters);
   faiss::IndexFlatL2 index(static_cast<faiss::Index::idx_t>(width));
-  const auto start = std::chrono::steady_clock::now();
+  const auto start = Clock::now();
   clustering.train(count, points.data(), index, floats.data());
   FaissResult result;
-  result.seconds = std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
+  result.seconds = seconds_since(start);
 
   std::vector<float> distances(bricks.size());
   std::vector<faiss::Index::idx_t> nearest(bricks.size());

@@ -7,9 +7,9 @@
 #include <nanovdb/util/Ray.h>
 
 #include <algorithm>
-#include <chrono>
 #include <glm/geometric.hpp>
 
+#include "formats/clock.h"
 #include "formats/parallel.h"
 
 namespace voxkit::bench {
@@ -73,7 +73,7 @@ Result<double> cast_with(const NanovdbGrid& volume, const Cast& cast, std::vecto
   const bool cubes = transform.voxel.x == transform.voxel.y && transform.voxel.x == transform.voxel.z;
   hits.resize(static_cast<size_t>(cast.width) * static_cast<size_t>(cast.height));
   const int64_t across = (cast.width + tile - 1) / tile, down = (cast.height + tile - 1) / tile;
-  const auto start = std::chrono::steady_clock::now();
+  const auto start = Clock::now();
   VOX_CHECK(parallel_for(ctx, across * down, [&](int64_t i) -> Status {
     auto accessor = grid.getAccessor();
     const int x0 = static_cast<int>(i % across) * tile, y0 = static_cast<int>(i / across) * tile;
@@ -102,7 +102,7 @@ Result<double> cast_with(const NanovdbGrid& volume, const Cast& cast, std::vecto
       }
     return {};
   }));
-  return std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
+  return seconds_since(start);
 }
 
 }  // namespace

@@ -2,7 +2,6 @@
 #include <fmt/core.h>
 
 #include <bit>
-#include <chrono>
 #include <cmath>
 #include <numeric>
 #include <vector>

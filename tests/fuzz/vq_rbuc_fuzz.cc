@@ -30,7 +30,7 @@ extern "C" int LLVMFuzzerTestOneInput(const uint8_t* data, size_t size) {
   expect("the portable decoder", [](auto... a) { return decode_codeword_portable(a...); });
   expect("the decoder", decode_codeword);
 #ifdef VOXKIT_AVX2
-  if (has_avx2()) expect("the AVX2 decoder", decode_codeword_avx2);
+  if (voxkit::has_avx2()) expect("the AVX2 decoder", decode_codeword_avx2);
 #endif
   if (expected && codeword_length(bytes.data(), available, bits) == 0)
     fuzz::stop("a valid codeword has no length");

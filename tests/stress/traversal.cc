@@ -1,7 +1,6 @@
 // Rays against exact arithmetic, by the million: README.md says which, and shows what came out.
 #include <algorithm>
 #include <atomic>
-#include <chrono>
 #include <cstdio>
 #include <cstdlib>
 #include <cstring>
@@ -9,6 +8,7 @@
 #include <thread>
 #include <vector>
 
+#include "formats/clock.h"
 #include "tests/stress/follow.h"
 
 namespace voxkit::stress {
@@ -173,7 +173,7 @@ void print_json(const std::vector<Row>& table, const char* what) {
 }
 
 int run(const Options& options) {
-  const auto started = std::chrono::steady_clock::now();
+  const auto started = Clock::now();
   Table table(static_cast<size_t>(families * grids));
   Counts sum;
   for (uint64_t pass = 0; sum.steps() < options.steps && sum.first_error.empty(); ++pass) {
@@ -181,7 +181,7 @@ int run(const Options& options) {
     sum = {};
     for (const Counts& counts : table) sum.add(counts);
   }
-  const double seconds = std::chrono::duration<double>(std::chrono::steady_clock::now() - started).count();
+  const double seconds = seconds_since(started);
   const auto by_family = rows(table, true), by_grid = rows(table, false);
   const Errors all = ours(sum);
   if (options.json) {

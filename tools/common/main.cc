@@ -83,7 +83,7 @@ void Run::note(const std::string& line) const {
 }
 
 double Run::seconds() const {
-  return std::chrono::duration<double>(std::chrono::steady_clock::now() - start_).count();
+  return seconds_since(start_);
 }
 
 int run_tool(int argc, char** argv, const std::string& tool, const std::string& purpose,

@@ -1,12 +1,12 @@
 // The life of a tool: options, work, one line about an error, an exit code.
 #pragma once
 
-#include <chrono>
 #include <cstdint>
 #include <functional>
 #include <memory>
 #include <string>
 
+#include "formats/clock.h"
 #include "formats/context.h"
 #include "tools/common/command_line.h"
 #include "tools/common/progress.h"
@@ -38,7 +38,7 @@ class Run {
  private:
   MemoryBudget memory_;
   std::unique_ptr<Progress> progress_;
-  std::chrono::steady_clock::time_point start_ = std::chrono::steady_clock::now();
+  Clock::time_point start_ = Clock::now();
 };
 
 /// The body of every main(): `declare` adds the tool's options, `work` does it and returns the exit code (0

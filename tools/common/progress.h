@@ -1,9 +1,9 @@
 // How far the work is, on standard error.
 #pragma once
 
-#include <chrono>
 #include <string>
 
+#include "formats/clock.h"
 #include "tools/common/command_line.h"
 
 namespace voxkit::cli {
@@ -22,7 +22,6 @@ class Progress {
   void detail(const std::string& text);
 
  private:
-  using Clock = std::chrono::steady_clock;
   ProgressMode mode_;
   std::string stage_, detail_;
   double fraction_ = 0;
