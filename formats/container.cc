@@ -4,7 +4,6 @@
 #include <xxhash.h>
 
 #include <algorithm>
-#include <cmath>
 #include <cstring>
 #include <mutex>
 
@@ -49,9 +48,11 @@ struct Container::Expanded {
 Container::Container() = default;
 Container::~Container() = default;
 
-ContainerWriter::ContainerWriter(ByteSink sink, Codec codec, int zstd, MemoryBudget& memory)
-    : sink_(std::move(sink)), codec_(codec) {
-  if (zstd > 0) packer_ = std::make_unique<ChunkPacker>(zstd, memory);
+ContainerWriter::ContainerWriter(ByteSink sink, Codec codec, uint16_t version, int zstd, MemoryBudget& memory)
+    : sink_(std::move(sink)), codec_(codec), version_(version) {
+  if (zstd <= 0) return;
+  packer_ = std::make_unique<ChunkPacker>(zstd, memory);
+  version_ = std::max<uint16_t>(version_, 2);
 }
 
 Status ContainerWriter::write(std::span<const std::byte> bytes) {
@@ -67,7 +68,7 @@ Status ContainerWriter::pad() {
 Status ContainerWriter::begin() {
   std::array<std::byte, block_size> header{};
   std::memcpy(header.data(), container_magic.data(), container_magic.size());
-  store_le<uint16_t>(&header[8], packer_ ? 2 : 1);
+  store_le<uint16_t>(&header[8], version_);
   store_le(&header[10], static_cast<uint16_t>(codec_));
   store_le(&header[56], checksum(std::span(header).first(56)));
   return write(header);
@@ -239,6 +240,10 @@ Result<std::span<const std::byte>> Container::expanded(size_t i, std::span<const
   return std::span<const std::byte>(own.bytes.get(), e.length);
 }
 
+bool Container::has_chunk(uint32_t kind) const {
+  return std::any_of(table_.begin(), table_.end(), [&](const ChunkEntry& e) { return e.kind == kind; });
+}
+
 Result<std::span<const std::byte>> Container::only_chunk(uint32_t kind) const {
   const auto is_kind = [&](const ChunkEntry& e) { return e.kind == kind; };
   const auto found = std::find_if(table_.begin(), table_.end(), is_kind);
@@ -247,54 +252,6 @@ Result<std::span<const std::byte>> Container::only_chunk(uint32_t kind) const {
   if (found->index != 0 || found->part != 0)
     return bad_input(name_, fmt::format("table: {}: expected index 0 and part 0", describe(*found)));
   return chunk(static_cast<size_t>(found - table_.begin()));
-}
-
-std::vector<std::byte> pack_volume_info(const VolumeInfo& info) {
-  std::vector<std::byte> bytes(112);
-  for (int i = 0; i < 3; ++i) {
-    store_le(&bytes[8 * i], static_cast<uint64_t>(info.dims[i]));
-    store_le(&bytes[32 + 8 * i], info.spacing[i]);
-    store_le(&bytes[56 + 8 * i], info.origin[i]);
-  }
-  bytes[24] = static_cast<std::byte>(info.format);
-  bytes[25] = static_cast<std::byte>(info.sample_type);
-  bytes[26] = static_cast<std::byte>(info.range.has_value());
-  store_le(&bytes[80], info.slope);
-  store_le(&bytes[88], info.intercept);
-  store_le(&bytes[96], info.range ? info.range->lo : 0.0);
-  store_le(&bytes[104], info.range ? info.range->hi : 0.0);
-  return bytes;
-}
-
-Result<VolumeInfo> unpack_volume_info(std::span<const std::byte> bytes, const std::string& file) {
-  if (bytes.size() != 112)
-    return bad_input(file, fmt::format("chunk VOLI: {} bytes: expected 112", bytes.size()));
-  VolumeInfo info;
-  for (int i = 0; i < 3; ++i) {
-    info.dims[i] = static_cast<int64_t>(load_le<uint64_t>(&bytes[8 * i]));
-    info.spacing[i] = load_le<double>(&bytes[32 + 8 * i]);
-    info.origin[i] = load_le<double>(&bytes[56 + 8 * i]);
-    if (!std::isfinite(info.spacing[i]) || !std::isfinite(info.origin[i]))
-      return bad_input(file, "chunk VOLI, byte 32: spacing and origin: expected finite numbers");
-  }
-  if (!checked_voxels(info.dims))
-    return bad_input(
-        file,
-        fmt::format("chunk VOLI, byte 0: dimensions {}x{}x{}: expected 1 to 2^31 a side and 2^62 in all",
-                    info.dims.x, info.dims.y, info.dims.z));
-  const int format = std::to_integer<int>(bytes[24]), type = std::to_integer<int>(bytes[25]);
-  if (format < 1 || format > 6)
-    return bad_input(file, fmt::format("chunk VOLI, byte 24: unknown voxel format {}", format));
-  info.format = static_cast<VoxelFormat>(format);
-  info.sample_type = static_cast<SampleType>(type);
-  if (type < 1 || type > 11 || (!is_colour(info.format) && scalar_format(info.sample_type) != info.format))
-    return bad_input(file, fmt::format("chunk VOLI, byte 25: sample type {} does not go with {}", type,
-                                       name(info.format)));
-  info.slope = load_le<double>(&bytes[80]);
-  info.intercept = load_le<double>(&bytes[88]);
-  if (bytes[26] != std::byte{0})
-    info.range = ValueRange{load_le<double>(&bytes[96]), load_le<double>(&bytes[104])};
-  return info;
 }
 
 }  // namespace voxkit

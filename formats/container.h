@@ -14,13 +14,13 @@
 #include "formats/chunk_zstd.h"
 #include "formats/context.h"
 #include "formats/result.h"
-#include "formats/volume.h"
 
 namespace voxkit {
 
 inline constexpr std::array<uint8_t, 8> container_magic = {0x89, 'V', 'O', 'X', '\r', '\n', 0x1A, '\n'};
-/// 2: chunks may be compressed; 1: none is.
-inline constexpr uint16_t container_version = 2;
+/// 3: there may be a chunk VOLX, without which voxels would be misread (volume_chunks.h); 2: chunks may be
+/// compressed; 1: neither. Writers take the least that does.
+inline constexpr uint16_t container_version = 3;
 
 enum class Codec : uint16_t { svmm = 1, vq = 2, color = 3 };
 
@@ -51,8 +51,9 @@ using ByteSink = std::function<Status(std::span<const std::byte>)>;
 class ContainerWriter {
  public:
   ContainerWriter(ByteSink sink, Codec codec) : sink_(std::move(sink)), codec_(codec) {}
-  /// Chunks are compressed with zstd where that is worth it; `zstd`: its level, 0: none is.
-  ContainerWriter(ByteSink sink, Codec codec, int zstd, MemoryBudget& memory);
+  /// `version`: at least that of the container. Chunks are compressed with zstd where that is worth it;
+  /// `zstd`: its level, 0: none is.
+  ContainerWriter(ByteSink sink, Codec codec, uint16_t version, int zstd, MemoryBudget& memory);
   Status add(uint32_t kind, uint32_t index, uint64_t part, std::span<const std::byte> bytes);
   /// Writes the table and the trailer. Nothing may follow.
   Status finish();
@@ -65,6 +66,7 @@ class ContainerWriter {
 
   ByteSink sink_;
   Codec codec_;
+  uint16_t version_ = 1;
   uint64_t position_ = 0;
   std::vector<ChunkEntry> table_;
   std::unique_ptr<ChunkPacker> packer_;
@@ -90,6 +92,7 @@ class Container {
   /// checksum or cannot be expanded to their length, ErrorCode::limit if there is no memory for that. Some
   /// bytes behind them may be read. Thread-safe.
   Result<std::span<const std::byte>> chunk(size_t i) const;
+  bool has_chunk(uint32_t kind) const;
   /// The bytes of the only chunk of this kind; ErrorCode::input if there is none, or more than one.
   Result<std::span<const std::byte>> only_chunk(uint32_t kind) const;
   /// Number of chunks whose bytes have been looked at so far.
@@ -114,10 +117,5 @@ class Container {
 
 /// True if the bytes begin like a container.
 bool is_container(std::span<const std::byte> bytes);
-
-/// The 'VOLI' chunk, common to all codecs of volumes.
-inline constexpr uint32_t volume_info_kind = chunk_kind("VOLI");
-std::vector<std::byte> pack_volume_info(const VolumeInfo& info);
-Result<VolumeInfo> unpack_volume_info(std::span<const std::byte> bytes, const std::string& file);
 
 }  // namespace voxkit

@@ -30,6 +30,8 @@ struct Context {
   int threads = 1;                 ///< workers of parallel_for; results never depend on it
   MemoryBudget* memory = nullptr;  ///< never null in a call
   std::function<void(double)> progress = [](double) {};  ///< fraction done, 0..1, from one thread at a time
+  /// A line for people: what of an input is dropped, assumed or found. The same line may come again.
+  std::function<void(const std::string&)> note = [](const std::string&) {};
 };
 
 /// Set by the signal handlers of the tools; long loops return ErrorCode::interrupted when it is non-zero.

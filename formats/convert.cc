@@ -24,8 +24,8 @@ class CroppedSource : public VolumeSource {
       : source_(std::move(source)), box_(box), slice_(std::move(slice)) {
     info_ = source_->info();
     info_.dims = box.size();
-    for (int axis = 0; axis < 3; ++axis)
-      info_.origin[axis] += static_cast<double>(box.lo[axis]) * info_.spacing[axis];
+    info_.affine = info_.affine.moved_to(
+        {static_cast<double>(box.lo.x), static_cast<double>(box.lo.y), static_cast<double>(box.lo.z)});
     info_.range.reset();  // a part may have a smaller one
   }
   bool forward_only() const override { return source_->forward_only(); }
@@ -78,7 +78,7 @@ class Conversion {
     if (from_ == VoxelFormat::float32) return;
     const int values = from_ == VoxelFormat::density16 ? 65536 : 256;
     table_.reserve(static_cast<size_t>(values));
-    for (int stored = 0; stored < values; ++stored) table_.push_back(of_value_(stored - from.bias()));
+    for (int stored = 0; stored < values; ++stored) table_.push_back(of_value_(from.sample(stored)));
   }
 
   void row(const std::byte* in, int64_t count, std::byte* out) const {
@@ -212,9 +212,11 @@ bool fits(const ValueRange& inner, const ValueRange& outer) {
 
 /// Least and greatest sample value that a volume may have.
 ValueRange possible_values(const VolumeInfo& info) {
-  return is_colour(info.format) || info.format == VoxelFormat::density8
-             ? ValueRange{-double(info.bias()), 255.0 - info.bias()}
-             : limits(info.sample_type);
+  if (info.labels) return {info.sample(0), info.sample(65535)};
+  if (is_colour(info.format) || info.format == VoxelFormat::density8)
+    return {info.sample(0), info.sample(255)};
+  return info.format == VoxelFormat::density16 ? ValueRange{info.sample(0), info.sample(65535)}
+                                               : limits(info.sample_type);
 }
 
 Voxel store(double value, const TargetType& type) {
@@ -304,13 +306,15 @@ Result<std::unique_ptr<VolumeSource>> convert_type(std::unique_ptr<VolumeSource>
   info.format = type.format;
   info.sample_type = type.sample_type;
   info.range.reset();
+  info.labels.reset();
+  info.wide_base = 0;
   if (auto rows = special_rows(from.format, type)) {
     return converted(std::move(source), info, std::move(rows), ctx);
   }
 
   // Sample values -> values of the new type: kept, or lo + (v - lo) stretched.
   const ValueRange target = limits(type.sample_type);
-  const ValueRange values{range.lo - from.bias(), range.hi - from.bias()};
+  const ValueRange values{from.sample(range.lo), from.sample(range.hi)};
   const bool integers = std::isfinite(possible_values(from).lo);
   const bool stretch = needs_range(from, type) && !(integers && fits(values, target));
   if (stretch && !(values.lo <= values.hi && std::isfinite(values.hi - values.lo)))
@@ -362,6 +366,8 @@ Result<std::unique_ptr<VolumeSource>> apply_scale(std::unique_ptr<VolumeSource> 
   info.slope = 1;
   info.intercept = 0;
   info.range.reset();
+  info.labels.reset();
+  info.wide_base = 0;
   const auto make = [slope = from.slope, intercept = from.intercept](double v) {
     return Voxel::of(static_cast<float>(slope * v + intercept));
   };

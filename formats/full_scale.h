@@ -17,8 +17,9 @@ inline double full_scale(const VolumeInfo& info, const ValueRange& range) {
     case VoxelFormat::bitmap:
       return 1;
     case VoxelFormat::density16: {
-      const double zero = info.bias();
-      const auto extent = static_cast<uint32_t>(std::max(range.hi, zero) - std::min(range.lo, zero));
+      const auto zero = static_cast<double>(info.bias());
+      const auto extent =
+          static_cast<uint64_t>(std::min(std::max(range.hi, zero) - std::min(range.lo, zero), 0x1p52));
       return static_cast<double>((uint64_t{1} << std::max(1, static_cast<int>(std::bit_width(extent)))) - 1);
     }
     case VoxelFormat::float32:

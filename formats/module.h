@@ -17,7 +17,7 @@ struct ImageQuantiser;  // image/coded_image_module.h
 struct MeshModule;      // mesh/mesh_module.h
 
 /// Grows with every change of ModuleTable, of a table that it names, or of a type that these mention.
-inline constexpr uint32_t module_abi = 7;
+inline constexpr uint32_t module_abi = 8;
 
 /// What a module offers: some of these, null for what it does not.
 struct ModuleTable {

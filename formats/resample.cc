@@ -56,13 +56,12 @@ class ResampledSource : public VolumeSource {
  public:
   ResampledSource(std::unique_ptr<VolumeSource> source, Index3 dims) : source_(std::move(source)) {
     info_ = source_->info();
+    Affine::Vector factors;
     for (int a = 0; a < 3; ++a) {
       axes_[a] = {info_.dims[a], dims[a]};
-      const double spacing =
-          info_.spacing[a] * static_cast<double>(axes_[a].n) / static_cast<double>(axes_[a].m);
-      info_.origin[a] += (spacing - info_.spacing[a]) / 2;  // the outer faces stay where they are
-      info_.spacing[a] = spacing;
+      factors[static_cast<size_t>(a)] = static_cast<double>(axes_[a].n) / static_cast<double>(axes_[a].m);
     }
+    info_.affine = info_.affine.coarser(factors);  // the outer faces stay where they are
     info_.dims = dims;
     info_.range.reset();
   }

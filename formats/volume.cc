@@ -22,6 +22,12 @@ std::string_view name(VoxelFormat f) {
   return "?";
 }
 
+std::string_view name(SampleType type) {
+  constexpr std::string_view names[] = {"",    "u8",  "i8",  "u16", "i16", "u32", "i32",
+                                        "u64", "i64", "f32", "f64", "bit", "f16"};
+  return names[static_cast<size_t>(type)];
+}
+
 VoxelFormat scalar_format(SampleType t) {
   switch (t) {
     case SampleType::u8:

@@ -1,15 +1,20 @@
 // What a volume is: voxel formats, extents, boxes, and the facts that travel with the voxels.
 #pragma once
 
+#include <algorithm>
 #include <array>
 #include <cstddef>
 #include <cstdint>
 #include <cstring>
 #include <glm/ext/vector_int3_sized.hpp>
 #include <glm/vec3.hpp>
+#include <memory>
 #include <optional>
+#include <string>
 #include <string_view>
+#include <vector>
 
+#include "formats/affine.h"
 #include "formats/hd.h"
 
 namespace voxkit {
@@ -102,7 +107,7 @@ inline Box intersect(const Box& a, const Box& b) {
 
 /// The type of a sample in the file that a volume was read from; decoding to the same kind of file restores
 /// it.
-enum class SampleType : uint8_t { u8 = 1, i8, u16, i16, u32, i32, u64, i64, f32, f64, bit };
+enum class SampleType : uint8_t { u8 = 1, i8, u16, i16, u32, i32, u64, i64, f32, f64, bit, f16 };
 constexpr int sample_bytes(SampleType t) {
   switch (t) {
     case SampleType::u8:
@@ -111,6 +116,7 @@ constexpr int sample_bytes(SampleType t) {
       return 1;
     case SampleType::u16:
     case SampleType::i16:
+    case SampleType::f16:
       return 2;
     case SampleType::u32:
     case SampleType::i32:
@@ -120,8 +126,16 @@ constexpr int sample_bytes(SampleType t) {
       return 8;
   }
 }
-/// The format in which samples of a type are held: u8, i8 -> DENSITY8; u16, i16 -> DENSITY16; bit -> BITMAP;
-/// all wider types -> FLOAT32, rounded to nearest (exact for integers up to 2^24).
+/// "u8", "i16", "f32" …, "bit".
+std::string_view name(SampleType t);
+/// Integers of more than 16 bits: no voxel format holds all of them.
+constexpr bool is_wide(SampleType t) {
+  return t == SampleType::u32 || t == SampleType::i32 || t == SampleType::u64 || t == SampleType::i64;
+}
+/// The format in which samples of a type are held, as a rule: u8, i8 -> DENSITY8; u16, i16 -> DENSITY16; bit
+/// -> BITMAP; all others -> FLOAT32. Of 64-bit floats it holds the nearest. Of wide integers it holds only
+/// those up to 2^24, but a volume of them may be held as VolumeInfo::wide_base or VolumeInfo::labels say
+/// (volume/wide_integers.h).
 VoxelFormat scalar_format(SampleType t);
 /// What is added to a sample to store it: 128 for i8, 32768 for i16, else 0. The round trip is exact.
 constexpr int32_t storage_bias(SampleType t) {
@@ -139,13 +153,48 @@ struct VolumeInfo {
   Index3 dims{0};  ///< voxels along x (fastest), y, z; each 1..2^31
   VoxelFormat format = VoxelFormat::density8;
   SampleType sample_type = SampleType::u8;  ///< type in the file; scalars only
-  std::array<double, 3> spacing{1, 1, 1};   ///< edge lengths of a voxel, in the file's unit
-  std::array<double, 3> origin{0, 0, 0};    ///< position of the centre of voxel (0,0,0)
+  Affine affine;                            ///< from the index of a voxel to the place of its centre
+  World world = World::unknown;             ///< that places are in
+  Unit unit = Unit::unknown;                ///< of places
+  uint8_t space_code = 0;                   ///< NIFTI_XFORM_*: what kind of space the world is; 0: not said
+  std::string description;                  ///< a line of text that the file has for people; UTF-8
   double slope = 1, intercept = 0;  ///< real value = slope * sample + intercept (recorded, not applied)
   std::optional<ValueRange> range;  ///< of stored values, where the file states it
+  /// Of wide integers in DENSITY8 or DENSITY16 without a table of labels: the sample that 0 stands for.
+  int64_t wide_base = 0;
+  /// Of DENSITY8 and DENSITY16: the sample that each stored value stands for, ascending, as the bits of its
+  /// sample type, sign-extended; null: none. Values from its size on do not occur.
+  std::shared_ptr<const std::vector<int64_t>> labels;
+  /// Values are names of things: there is no average of two of them. With or without a table.
+  bool is_labels = false;
+  /// The stored value that stands for "nothing was measured here"; it has no part in ranges and averages.
+  std::optional<double> fill;
+  bool rounded = false;  ///< voxels may be nearest to, not equal to, the samples of the file
+  /// What the file has more than one of, and this volume is one of: for people, as "--time 0 of 0..9".
+  std::vector<std::string> parts;
 
   Box box() const { return {{0, 0, 0}, dims}; }
-  int32_t bias() const { return is_colour(format) ? 0 : storage_bias(sample_type); }
+  /// The sample that a stored value stands for. Of labels: a stored value beyond the table stands for the
+  /// last.
+  double sample(double stored) const {
+    if (!labels) return stored - static_cast<double>(bias());
+    const int64_t label = (*labels)[std::min(static_cast<size_t>(stored), labels->size() - 1)];
+    return sample_type == SampleType::u64 ? static_cast<double>(static_cast<uint64_t>(label))
+                                          : static_cast<double>(label);
+  }
+  /// The stored value of a sample; of labels: that of the first one that is not below it.
+  double stored(double value) const {
+    if (!labels) return value + static_cast<double>(bias());
+    double index = 0;
+    while (index + 1 < static_cast<double>(labels->size()) && sample(index) < value) ++index;
+    return index;
+  }
+  /// What was added to samples to store them, where there is no table of labels.
+  int64_t bias() const {
+    return is_colour(format)                                        ? 0
+           : is_wide(sample_type) && format != VoxelFormat::float32 ? -wide_base
+                                                                    : storage_bias(sample_type);
+  }
 };
 
 /// dims.x * dims.y * dims.z, or nothing if a side is outside 1..2^31 or the product exceeds 2^62.

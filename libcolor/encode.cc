@@ -6,6 +6,7 @@
 #include "formats/clock.h"
 #include "formats/parallel.h"
 #include "formats/reservation.h"
+#include "formats/volume_chunks.h"
 #include "libcolor/blocks/block_encode.h"
 #include "libcolor/blocks/lab_colors.h"
 #include "libcolor/dag/color_order.h"
@@ -157,8 +158,8 @@ Result<Report> encode(SurfaceSource& source, const Options& options, const Store
   const int height = height_of(info.dims);
   if (info.format != VoxelFormat::rgba32 || height > most_levels || !checked_voxels(info.dims))
     return fail(ErrorCode::internal, {}, "not the extents of a surface");
-  ContainerWriter container(sink, Codec::color, options.zstd, *ctx.memory);
-  VOX_CHECK(container.add(volume_info_kind, 0, 0, pack_volume_info(info)));
+  ContainerWriter container(sink, Codec::color, container_version_for(info), options.zstd, *ctx.memory);
+  VOX_CHECK(add_volume_info(container, info));
 
   ColorWriter colors(options, stored, container, ctx);
   VOX_CHECK(colors.begin());

@@ -4,6 +4,7 @@
 #include <algorithm>
 #include <bit>
 
+#include "formats/volume_chunks.h"
 #include "libcolor/dag/void_search.h"
 #include "libcolor/store.h"
 #include "libcolor/surface/morton.h"
@@ -76,8 +77,7 @@ Result<std::shared_ptr<const Volume>> Volume::open(std::shared_ptr<const Contain
   const std::string& file = container->name();
   if (container->codec() != Codec::color) return bad_input(file, "header, byte 10: not a coloured surface");
   std::shared_ptr<Volume> volume(new Volume);
-  VOX_TRY(const auto info_bytes, container->only_chunk(volume_info_kind));
-  VOX_TRY(volume->info_, unpack_volume_info(info_bytes, file));
+  VOX_TRY(volume->info_, read_volume_info(*container));
   VOX_TRY(const auto params_bytes, container->only_chunk(params_kind));
   VOX_TRY(volume->params_, unpack_params(params_bytes, volume->info_, file));
   volume->store_ = std::make_unique<Store>();

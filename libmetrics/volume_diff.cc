@@ -68,8 +68,11 @@ class Comparison {
       : a_(a.format),
         b_(b.format),
         error_(error_volume_info(a, b).format),
-        bias_a_(a.bias()),
-        bias_b_(b.bias()) {}
+        values_a_(a),
+        values_b_(b),
+        whole_(values_a_.is_small() && values_b_.is_small()),
+        same_values_(a.bias() == b.bias() && a.sample_type == b.sample_type &&
+                     (a.labels == b.labels || (a.labels && b.labels && *a.labels == *b.labels))) {}
 
   void row(const std::byte* a, const std::byte* b, int64_t n, std::byte* errors, Sums& sums,
            const Counter& count) const {
@@ -101,13 +104,21 @@ class Comparison {
   template <class A, class B>
   void scalars(const std::byte* a, const std::byte* b, int64_t n, std::byte* errors, Sums& sums,
                const Counter& count) const {
-    if constexpr (std::is_integral_v<A> && std::is_integral_v<B>) {
+    if constexpr (std::is_integral_v<A> && std::is_integral_v<B>)
+      if (whole_) return integers<A, B>(a, b, n, errors, sums, count);
+    reals<A, B>(a, b, n, errors, sums, count);
+  }
+
+  template <class A, class B>
+  void integers(const std::byte* a, const std::byte* b, int64_t n, std::byte* errors, Sums& sums,
+                const Counter& count) const {
+    {
       // Rows are shorter than 2^31, so sums of squares of 17 bit differences fit 64 bits... as do those of
       // samples.
       uint64_t squares = 0, absolute = 0, signal = 0, differing = 0;
       uint32_t greatest = 0;
       int32_t lo = std::numeric_limits<int32_t>::max(), hi = std::numeric_limits<int32_t>::min();
-      const int32_t bias_a = bias_a_, bias_b = bias_b_;
+      const auto bias_a = static_cast<int32_t>(values_a_.bias), bias_b = static_cast<int32_t>(values_b_.bias);
       for (int64_t i = 0; i < n; ++i) {
         const int32_t va = load_le<A>(a + i * static_cast<int64_t>(sizeof(A))) - bias_a;
         const int32_t vb = load_le<B>(b + i * static_cast<int64_t>(sizeof(B))) - bias_b;
@@ -139,13 +150,18 @@ class Comparison {
             store_le(errors + i * static_cast<int64_t>(sizeof(A)), static_cast<A>(std::abs(va - vb)));
         }
       }
-    } else {
+    }
+  }
+
+  template <class A, class B>
+  void reals(const std::byte* a, const std::byte* b, int64_t n, std::byte* errors, Sums& sums,
+             const Counter& count) const {
+    {
       Sums part;
       for (int64_t i = 0; i < n; ++i) {
         const A stored_a = load_le<A>(a + i * static_cast<int64_t>(sizeof(A)));
         const B stored_b = load_le<B>(b + i * static_cast<int64_t>(sizeof(B)));
-        const double va = static_cast<double>(stored_a) - bias_a_,
-                     vb = static_cast<double>(stored_b) - bias_b_;
+        const double va = values_a_(stored_a), vb = values_b_(stored_b);
         double d = va == vb ? 0 : std::abs(va - vb);
         if (std::isnan(d)) d = std::isnan(va) && std::isnan(vb) ? 0 : infinity;
         part.real.squares += d * d;
@@ -155,13 +171,17 @@ class Comparison {
           part.lo = std::min(part.lo, va);
           part.hi = std::max(part.hi, va);
         }
-        if constexpr (std::is_same_v<A, B>)
+        if (std::is_same_v<A, B> && same_values_)
           part.differing += std::memcmp(&stored_a, &stored_b, sizeof(A)) != 0;
         else
           part.differing += d != 0;
         part.greatest = std::max(part.greatest, d);
         if (count) count(d);
-        if (errors != nullptr) store_le(errors + 4 * i, static_cast<float>(d));
+        if (errors == nullptr) continue;
+        if (error_ == VoxelFormat::float32)
+          store_le(errors + 4 * i, static_cast<float>(d));
+        else
+          store_le(errors + i * static_cast<int64_t>(sizeof(A)), static_cast<A>(std::min(d, 65535.0)));
       }
       sums.merge(part);
     }
@@ -199,8 +219,26 @@ class Comparison {
     sums.merge(part);
   }
 
+  /// From stored values to samples.
+  struct Values {
+    explicit Values(const VolumeInfo& info) : bias(info.bias()) {
+      if (!info.labels) return;
+      for (size_t i = 0; i < info.labels->size(); ++i) labels.push_back(info.sample(static_cast<double>(i)));
+    }
+    /// Whether all of them, and their differences, are 32 bit integers.
+    bool is_small() const { return labels.empty() && std::abs(bias) < int64_t{1} << 30; }
+    template <class T>
+    double operator()(T stored) const {
+      if (labels.empty()) return static_cast<double>(stored) - static_cast<double>(bias);
+      return labels[std::min(static_cast<size_t>(stored), labels.size() - 1)];
+    }
+    int64_t bias;
+    std::vector<double> labels;
+  };
+
   VoxelFormat a_, b_, error_;
-  int32_t bias_a_, bias_b_;
+  Values values_a_, values_b_;
+  bool whole_, same_values_;
 };
 
 double decibels(double signal, double noise) {
@@ -213,7 +251,9 @@ VolumeDiff summarise(const Sums& sums, const VolumeInfo& a, int channels, std::o
   diff.voxels = *checked_voxels(a.dims);
   diff.voxel_format = a.format;
   const ValueRange samples = sums.lo <= sums.hi ? ValueRange{sums.lo, sums.hi} : ValueRange{0, 0};
-  diff.peak = peak ? *peak : full_scale(a, {samples.lo + a.bias(), samples.hi + a.bias()});
+  diff.peak = peak ? *peak
+                   : full_scale(a, {samples.lo + static_cast<double>(a.bias()),
+                                    samples.hi + static_cast<double>(a.bias())});
   const double voxels = static_cast<double>(diff.voxels), samples_count = voxels * channels;
   diff.mse = (static_cast<double>(sums.whole.squares) + sums.real.squares) / samples_count;
   diff.rmse = std::sqrt(diff.mse);
@@ -267,11 +307,14 @@ VolumeInfo error_volume_info(const VolumeInfo& a, const VolumeInfo& b) {
   VolumeInfo info = a;
   info.range.reset();
   info.intercept = 0;
+  info.labels.reset();
+  info.wide_base = 0;
+  info.is_labels = false;
   if (is_colour(a.format)) {
     if (b.format == VoxelFormat::rgba32) info.format = b.format;
     return info;
   }
-  const bool same = a.format == b.format && a.bias() == b.bias();
+  const bool same = a.format == b.format && a.bias() == b.bias() && !a.labels && !b.labels;
   info.format = same ? a.format : VoxelFormat::float32;
   switch (info.format) {
     case VoxelFormat::density8:

@@ -95,8 +95,9 @@ Result<std::vector<Camera>> camera_path(const std::string& name, const Camera& c
 
 GridTransform::GridTransform(const VolumeInfo& info) {
   glm::dvec3 size;
+  const Affine::Vector spacing = info.affine.spacing();
   for (int a = 0; a < 3; ++a) {
-    const double edge = std::abs(info.spacing[static_cast<size_t>(a)]);
+    const double edge = spacing[static_cast<size_t>(a)];
     voxel[a] = edge > 0 ? edge : 1;
     size[a] = voxel[a] * static_cast<double>(info.dims[a]);
   }

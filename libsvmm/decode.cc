@@ -4,6 +4,7 @@
 #include <algorithm>
 #include <cmath>
 
+#include "formats/volume_chunks.h"
 #include "libsvmm/base_block.h"
 #include "libsvmm/base_voxel.h"
 #include "libsvmm/store.h"
@@ -53,8 +54,7 @@ Result<std::shared_ptr<const Volume>> Volume::open(std::shared_ptr<const Contain
   const std::string& file = container->name();
   if (container->codec() != Codec::svmm) return bad_input(file, "header, byte 10: not an SVMM volume");
   std::shared_ptr<Volume> volume(new Volume);
-  VOX_TRY(const auto info_bytes, container->only_chunk(volume_info_kind));
-  VOX_TRY(volume->info_, unpack_volume_info(info_bytes, file));
+  VOX_TRY(volume->info_, read_volume_info(*container));
   VOX_TRY(const auto params_bytes, container->only_chunk(params_kind));
   VOX_TRY(auto unpacked, unpack_params(params_bytes, volume->info_, file));
   volume->params_ = std::move(unpacked.params);
@@ -359,10 +359,7 @@ class SvmmSource final : public VolumeSource {
     info_ = volume_->info();
     info_.dims = volume_->dims_at(level);
     const double factor = static_cast<double>(volume_->levels()[static_cast<size_t>(level)].mip_factor);
-    for (size_t i = 0; i < 3; ++i) {
-      info_.origin[i] += info_.spacing[i] * (factor - 1) / 2;  // the centre of the first voxel
-      info_.spacing[i] *= factor;
-    }
+    info_.affine = info_.affine.coarser({factor, factor, factor});
   }
   Status read(const Box& box, VoxelSpan out) override { return volume_->decode(box, level_, out); }
   std::optional<Voxel> uniform(const Box& box) const override { return volume_->uniform(box, level_); }

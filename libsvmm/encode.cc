@@ -14,6 +14,7 @@
 
 #include "formats/parallel.h"
 #include "formats/reservation.h"
+#include "formats/volume_chunks.h"
 #include "libsvmm/encode_level.h"
 
 namespace voxkit::svmm {
@@ -110,7 +111,7 @@ class Encoder {
         params_(params),
         criterion_(params, F),
         ctx_(ctx),
-        container_(sink, Codec::svmm, params.zstd, *ctx.memory),
+        container_(sink, Codec::svmm, container_version_for(info_), params.zstd, *ctx.memory),
         levels_(plan_levels(info_, params)),
         reservation_(*ctx.memory) {
     if (levels_.size() == 1) params_.base = Base::raw;
@@ -127,7 +128,7 @@ class Encoder {
       VOX_CHECK(encode_tiles());
     }
     for (LevelWriter& writer : writers_) VOX_CHECK(writer.flush());
-    VOX_CHECK(container_.add(volume_info_kind, 0, 0, pack_volume_info(info_)));
+    VOX_CHECK(add_volume_info(container_, info_));
     VOX_CHECK(container_.add(params_kind, 0, 0, pack_params(params_, levels_)));
     VOX_CHECK(container_.finish());
     return std::move(levels_);

@@ -5,6 +5,7 @@
 #include <cstring>
 #include <type_traits>
 
+#include "formats/volume_chunks.h"
 #include "libvq/store.h"
 
 namespace voxkit::vq {
@@ -16,8 +17,7 @@ Result<std::shared_ptr<const Volume>> Volume::open(std::shared_ptr<const Contain
   const std::string& file = container->name();
   if (container->codec() != Codec::vq) return bad_input(file, "header, byte 10: not a VQ volume");
   std::shared_ptr<Volume> volume(new Volume);
-  VOX_TRY(const auto info_bytes, container->only_chunk(volume_info_kind));
-  VOX_TRY(volume->info_, unpack_volume_info(info_bytes, file));
+  VOX_TRY(volume->info_, read_volume_info(*container));
   VOX_TRY(const auto params_bytes, container->only_chunk(params_kind));
   VOX_TRY(auto unpacked, unpack_params(params_bytes, volume->info_, file));
   volume->params_ = unpacked.params;

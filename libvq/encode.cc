@@ -5,6 +5,7 @@
 #include <bit>
 #include <cmath>
 
+#include "formats/volume_chunks.h"
 #include "libvq/cluster.h"
 
 namespace voxkit::vq {
@@ -20,7 +21,7 @@ class Writer {
         quantiser_(quantiser),
         codes_(collected.codes),
         numbers_(collected.numbers),
-        container_(sink, Codec::vq, options.zstd, *ctx.memory),
+        container_(sink, Codec::vq, container_version_for(info_), options.zstd, *ctx.memory),
         reservation_(*ctx.memory) {}
 
   Result<Report> write(Report report) {
@@ -31,7 +32,7 @@ class Writer {
     find_bits_and_common();
     if (p.codebook == Codebook::rbuc) VOX_CHECK(place_bricks());
     VOX_CHECK(choose_mapping());
-    VOX_CHECK(container_.add(volume_info_kind, 0, 0, pack_volume_info(info_)));
+    VOX_CHECK(add_volume_info(container_, info_));
     VOX_CHECK(container_.add(params_kind, 0, 0, pack_params(p, id_of(common_))));
     for (uint64_t part = 0; part < chunks(numbers_.size(), block_chunk_log2 + 6); ++part)
       VOX_CHECK(container_.add(offsets_kind, 0, part,

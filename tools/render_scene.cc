@@ -61,7 +61,7 @@ Result<Scene> open_scene(const std::string& name, const SceneOptions& o, Run& ru
   }
   const VoxelFormat format = scene.info.format;
   if (o.range) {
-    scene.range = {o.range->lo + scene.info.bias(), o.range->hi + scene.info.bias()};
+    scene.range = {scene.info.stored(o.range->lo), scene.info.stored(o.range->hi)};
   } else if (format == VoxelFormat::density16 || format == VoxelFormat::float32) {
     if (name == "-")
       return bad_usage(
@@ -96,15 +96,14 @@ Status check_transfer(const std::string& name) {
 
 Result<TransferFunction> find_transfer(const std::string& name, const SceneOptions& o,
                                        const Scene& measured) {
-  const double bias = measured.info.bias();
   if (!is_transfer_preset(name)) {
     VOX_TRY(std::vector<TransferPoint> points, read_transfer_file(name));
-    for (TransferPoint& point : points) point.value += bias;
+    for (TransferPoint& point : points) point.value = measured.info.stored(point.value);
     return TransferFunction(std::move(points));
   }
   ValueRange range{0, 255};
   if (o.range)
-    range = {o.range->lo + bias, o.range->hi + bias};
+    range = {measured.info.stored(o.range->lo), measured.info.stored(o.range->hi)};
   else if (measured.info.format == VoxelFormat::bitmap)
     range = {0, 1};
   else if (measured.info.format != VoxelFormat::density8)

@@ -109,7 +109,7 @@ Result<int> work(const Options& o, Run& run) {
   VOX_CHECK(svmm::validate(params, info));
   ValueRange range{0, 1};
   if (o.range) {
-    range = {o.range->lo + info.bias(), o.range->hi + info.bias()};
+    range = {info.stored(o.range->lo), info.stored(o.range->hi)};
   } else if (!lossless && (info.format == VoxelFormat::density16 || info.format == VoxelFormat::float32)) {
     run.stage("measure");
     VOX_TRY(range, measure_range(*source, run.ctx));

@@ -3,6 +3,7 @@
 
 #include "formats/convert.h"
 #include "formats/copy.h"
+#include "formats/orient.h"
 #include "formats/volume/open_volume.h"
 #include "formats/volume/readers.h"
 #include "tools/common/input.h"
@@ -22,6 +23,7 @@ struct Options {
   std::optional<Index3> resample;
   std::optional<ValueRange> range;
   bool apply_scale = false;
+  std::string orient;
 };
 
 void declare(CommandLine& line, Options& o) {
@@ -38,6 +40,10 @@ void declare(CommandLine& line, Options& o) {
   declare_range_option(line, o.range,
                        "Values that a narrower type's ends stand for (default: least and greatest value)");
   line.flag("--apply-scale", "Write real values (slope and intercept applied) as f32", o.apply_scale);
+  line.text(
+      "--orient", "CODE",
+      "Permute and flip axes, losslessly: three letters, such as RAS or LPI, or canonical (before --crop)",
+      o.orient);
   line.option("--crop", "BOX", "X0,Y0,Z0,X1,Y1,Z1: part of the input, half open", box(o.crop));
   line.option("--resample", "X,Y,Z", "New extent, after --crop", dims(o.resample));
   declare_input_options(line, o.open, false);
@@ -47,6 +53,10 @@ void declare(CommandLine& line, Options& o) {
 Result<std::unique_ptr<VolumeSource>> open(const Options& o, Context& ctx) {
   VOX_TRY(Input input, open_input(o.input, o.open, ctx));
   auto source = std::move(input.source);
+  if (!o.orient.empty()) {
+    VOX_TRY(const AxisOrder order, order_for(o.orient, source->info()));
+    VOX_TRY(source, reordered(std::move(source), order, ctx));
+  }
   if (o.crop) {
     VOX_TRY(source, crop(std::move(source), *o.crop, ctx));
   }
@@ -68,6 +78,7 @@ Result<int> work(Options& o, Run& run) {
     const auto type = parse_target_type(*o.type);
     if (!type) return bad_usage("--type: " + type.error().what);
     o.output_type = *type;
+    o.open.round_wide = o.output_type->format == VoxelFormat::float32;
   }
   if (run.options.json && o.output == "-")
     return bad_usage("--json and the output - both use standard output");

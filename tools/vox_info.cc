@@ -44,11 +44,6 @@ std::string_view format_of(const std::string& file, const Input& input) {
 std::string_view codec_of(const Input& input) {
   return input.svmm ? "svmm" : input.vq ? "vq" : input.color ? "dagcolor" : "none";
 }
-std::string_view name(SampleType type) {
-  constexpr std::string_view names[] = {"",    "u8",  "i8",  "u16", "i16", "u32",
-                                        "i32", "u64", "i64", "f32", "f64", "bit"};
-  return names[static_cast<size_t>(type)];
-}
 std::string letters(uint32_t kind) {
   std::string text;
   for (int i = 0; i < 4; ++i) text += static_cast<char>(kind >> (8 * i) & 0xff);
@@ -69,7 +64,7 @@ Json json_of(const Options& o, const Run& run, const Input& input, std::optional
   json.set("tool", run.tool).set("version", version_text()).set("input", o.file);
   json.set("format", format_of(o.file, input)).set("codec", codec_of(input));
   json.set("dims", info.dims).set("voxel_format", voxkit::name(info.format));
-  if (!is_colour(info.format)) json.set("sample_type", name(info.sample_type));
+  if (!is_colour(info.format)) json.set("sample_type", voxkit::name(info.sample_type));
   json.set("raw_bytes", raw_bytes(info));
   if (bytes) {
     json.set("file_bytes", *bytes);
@@ -77,13 +72,29 @@ Json json_of(const Options& o, const Run& run, const Input& input, std::optional
     json.set("bits_per_voxel",
              8 * static_cast<double>(*bytes) / static_cast<double>(*checked_voxels(info.dims)));
   }
-  Json spacing = Json::array(), origin = Json::array();
+  Json spacing = Json::array(), origin = Json::array(), affine = Json::array();
+  const Affine::Vector lengths = info.affine.spacing();
   for (size_t a = 0; a < 3; ++a) {
-    spacing.push(info.spacing[a]);
-    origin.push(info.origin[a]);
+    spacing.push(lengths[a]);
+    origin.push(info.affine.origin[a]);
+    Json row = Json::array();
+    for (size_t b = 0; b < 3; ++b) row.push(info.affine.axes[b][a]);
+    row.push(info.affine.origin[a]);
+    affine.push(std::move(row));
   }
-  json.set("spacing", std::move(spacing)).set("origin", std::move(origin));
+  json.set("spacing", std::move(spacing)).set("origin", std::move(origin)).set("affine", std::move(affine));
+  json.set("world", voxkit::name(info.world)).set("unit", voxkit::name(info.unit));
+  json.set("orientation", orientation(info.affine, info.world));
   json.set("slope", info.slope).set("intercept", info.intercept);
+  if (!info.description.empty()) json.set("description", info.description);
+  if (info.fill) json.set("fill", info.sample(*info.fill));
+  if (info.is_labels) json.set("labels", true);
+  if (info.labels) json.set("different_values", static_cast<uint64_t>(info.labels->size()));
+  if (!info.parts.empty()) {
+    Json parts = Json::array();
+    for (const std::string& part : info.parts) parts.push(part);
+    json.set("parts", std::move(parts));
+  }
   json.set("params", input.svmm    ? params_json(input.svmm->params())
                      : input.vq    ? params_json(input.vq->params())
                      : input.color ? params_json(input.color->params())
@@ -122,16 +133,38 @@ std::string compression_text(const Container& container) {
                      stored, plain);
 }
 
+/// Where the volume is: in a line, and another one where its axes are not those of the world.
+std::string place_text(const VolumeInfo& info) {
+  const Affine& at = info.affine;
+  const Affine::Vector spacing = at.spacing();
+  std::string text = fmt::format("spacing     {:.6g} {:.6g} {:.6g}, origin {:.6g} {:.6g} {:.6g}", spacing[0],
+                                 spacing[1], spacing[2], at.origin[0], at.origin[1], at.origin[2]);
+  if (info.unit != Unit::unknown) text += fmt::format(" {}", voxkit::name(info.unit));
+  if (info.world != World::unknown) text += fmt::format(", {}", voxkit::name(info.world));
+  text += "\n";
+  if (!at.is_plain()) {
+    text += fmt::format("axes        {}:", orientation(at, info.world));
+    for (const Affine::Vector& axis : at.axes)
+      text += fmt::format(" ({:.6g},{:.6g},{:.6g})", axis[0], axis[1], axis[2]);
+    text += "\n";
+  }
+  return text;
+}
+
 std::string text_of(const Options& o, const Input& input, std::optional<uint64_t> bytes) {
   const VolumeInfo& info = input.source->info();
   std::string text = fmt::format("{}: {}\n", o.file, format_of(o.file, input));
   text += fmt::format("voxels      {} x {} x {} {}", info.dims.x, info.dims.y, info.dims.z,
                       voxkit::name(info.format));
-  text += is_colour(info.format) ? "\n" : fmt::format(" ({})\n", name(info.sample_type));
-  text += fmt::format("spacing     {:.6g} {:.6g} {:.6g}, origin {:.6g} {:.6g} {:.6g}\n", info.spacing[0],
-                      info.spacing[1], info.spacing[2], info.origin[0], info.origin[1], info.origin[2]);
+  text += is_colour(info.format) ? "\n" : fmt::format(" ({})\n", voxkit::name(info.sample_type));
+  text += place_text(info);
   if (info.slope != 1 || info.intercept != 0)
     text += fmt::format("real value  {:.6g} * sample + {:.6g}\n", info.slope, info.intercept);
+  if (info.fill) text += fmt::format("fill value  {:.9g}\n", info.sample(*info.fill));
+  if (info.labels) text += fmt::format("values      {} different ones\n", info.labels->size());
+  if (info.is_labels) text += "meaning     labels\n";
+  if (!info.description.empty()) text += fmt::format("description {}\n", info.description);
+  for (const std::string& part : info.parts) text += fmt::format("part        {}\n", part);
   text += fmt::format("raw bytes   {}\n", raw_bytes(info));
   if (bytes)
     text += fmt::format("file bytes  {} ({:.4g} %, {:.4g} bits a voxel)\n", *bytes,
@@ -164,7 +197,9 @@ class NullSink : public VolumeSink {
 };
 
 Result<int> work(const Options& o, Run& run) {
-  VOX_TRY(const Input input, open_input(o.file, o.open, run.ctx));
+  OpenOptions open = o.open;
+  open.any_part = true;
+  VOX_TRY(const Input input, open_input(o.file, open, run.ctx));
   if (o.check) {
     run.stage("check");
     NullSink sink;

@@ -61,8 +61,8 @@ class MarschnerLobbSource final : public VolumeSource {
     info_.format = VoxelFormat::density16;
     info_.sample_type = SampleType::u16;
     info_.slope = 1.0 / 65535;
-    info_.spacing.fill(2 / static_cast<double>(side - 1));
-    info_.origin.fill(-1);
+    const double step = 2 / static_cast<double>(side - 1);
+    info_.affine = Affine::plain({step, step, step}, {-1, -1, -1});
   }
 
   Status read(const Box& box, VoxelSpan out) override {

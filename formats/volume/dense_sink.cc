@@ -5,6 +5,8 @@
 #include <algorithm>
 #include <cstring>
 
+#include "formats/volume/wide_integers.h"
+
 namespace voxkit {
 namespace {
 
@@ -14,6 +16,7 @@ constexpr size_t buffer_bytes = size_t{1} << 20;
 
 SampleLayout storage_layout(const VolumeInfo& info) {
   if (is_colour(info.format)) return {SampleType::u8, attributes(info.format), false};
+  if (is_wide(info.sample_type)) return {info.sample_type, 1, false};
   if (info.format == VoxelFormat::float32) return {SampleType::f32, 1, false};
   if (scalar_format(info.sample_type) == info.format) return {info.sample_type, 1, false};
   if (info.format == VoxelFormat::density16) return {SampleType::u16, 1, false};
@@ -73,16 +76,21 @@ Status DenseSink::put_voxels(const std::byte* voxels, int64_t count) {
     }
     return put(std::span(buffer_).first(filled));
   }
+  const bool wide = is_wide(layout_.type);
   const bool as_it_is =
-      storage_bias(layout_.type) == 0;  // samples of such types lie in files as they do in memory
+      storage_bias(layout_.type) == 0 && !wide;  // samples of such types lie in files as they do in memory
   const int64_t batch =
-      as_it_is ? std::max<int64_t>(count, 1) : static_cast<int64_t>(buffer_.size()) / in_bytes;
+      as_it_is ? std::max<int64_t>(count, 1)
+               : static_cast<int64_t>(buffer_.size()) / std::max(in_bytes, layout_.bytes_per_voxel());
   for (int64_t done = 0; done < count; done += batch) {
     const int64_t n = std::min(batch, count - done);
     const std::byte* from = voxels + done * in_bytes;
-    if (!as_it_is) {
+    if (wide) {
+      to_wide(from, n, info_, buffer_.data());
+      from = buffer_.data();
+    } else if (!as_it_is) {
       // Adding the bias turns the sign bit over, and so does taking it away: conversion is its own inverse.
-      convert_samples(from, layout_, n, info_.format, buffer_.data());
+      convert_samples(from, layout_, n, info_, buffer_.data());
       from = buffer_.data();
     }
     VOX_CHECK(put({from, static_cast<size_t>(n * layout_.bytes_per_voxel())}));

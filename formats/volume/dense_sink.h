@@ -10,8 +10,8 @@
 
 namespace voxkit {
 
-/// The samples in which a volume is written: its sample_type where that is u8, i8, u16, i16, f32 or bit (and
-/// what the format holds), else the plain type of the format; colours as 3 or 4 u8. Little endian.
+/// The samples in which a volume is written: its sample_type where that is an integer or f32 (and what the
+/// format holds), else the plain type of the format; colours as 3 or 4 u8. Little endian.
 SampleLayout storage_layout(const VolumeInfo& info);
 
 /// Writes slabs as samples to an OutputFile, in bounded buffers; `finish` commits it.

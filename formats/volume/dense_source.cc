@@ -3,10 +3,14 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <atomic>
 #include <bit>
 #include <cstring>
 #include <type_traits>
 #include <vector>
+
+#include "formats/parallel.h"
+#include "formats/volume/wide_integers.h"
 
 namespace voxkit {
 namespace {
@@ -66,6 +70,37 @@ void unpack_bits(const std::byte* in, uint64_t first, int64_t count, std::byte* 
   while (i < end) one();
 }
 
+/// Half floats, every one of which is a float.
+float half_to_float(uint16_t half) {
+  const uint32_t sign = static_cast<uint32_t>(half & 0x8000) << 16, exponent = half >> 10 & 31,
+                 fraction = half & 0x3ff;
+  if (exponent == 31) return std::bit_cast<float>(sign | 0x7f800000u | fraction << 13);
+  if (exponent > 0) return std::bit_cast<float>(sign | (exponent + 112) << 23 | fraction << 13);
+  const float magnitude = static_cast<float>(fraction) * 0x1p-24f;
+  return std::bit_cast<float>(std::bit_cast<uint32_t>(magnitude) | sign);
+}
+
+const std::string rounding_note = "64-bit floats are rounded to 32 bits";
+
+/// Whether some double is not a float. NaN may differ in its payload.
+Result<bool> rounds_doubles(std::span<const std::byte> samples, bool big_endian, Context& ctx) {
+  constexpr int64_t part = int64_t{1} << 20;
+  const auto count = static_cast<int64_t>(samples.size() / sizeof(double));
+  std::atomic<bool> rounds = false;
+  VOX_CHECK(parallel_for(ctx, (count + part - 1) / part, [&](int64_t k) -> Status {
+    bool some = false;
+    for (int64_t i = k * part, end = std::min(count, i + part); i < end && !rounds; ++i) {
+      uint64_t word;
+      std::memcpy(&word, samples.data() + i * 8, 8);
+      const auto value = std::bit_cast<double>(big_endian ? swap_bytes(word) : word);
+      some |= static_cast<double>(static_cast<float>(value)) != value && value == value;
+    }
+    if (some) rounds = true;
+    return {};
+  }));
+  return rounds.load();
+}
+
 /// Whether the bytes in the file are the bytes in memory.
 bool same_layout(const SampleLayout& layout, VoxelFormat format) {
   if (layout.type == SampleType::u8) return format != VoxelFormat::bitmap;
@@ -120,7 +155,7 @@ class MappedSource final : public VolumeSource {
       if (layout_.type == SampleType::bit) {
         unpack_bits(samples_, static_cast<uint64_t>(voxel), runs.voxels, runs.memory(run));
       } else {
-        convert_samples(samples_ + voxel * layout_.bytes_per_voxel(), layout_, runs.voxels, info_.format,
+        convert_samples(samples_ + voxel * layout_.bytes_per_voxel(), layout_, runs.voxels, info_,
                         runs.memory(run));
       }
     }
@@ -189,7 +224,7 @@ class StreamedSource final : public VolumeSource {
           used = 0;
         }
         const int64_t n = std::min(runs.voxels - done, buffered - used);
-        convert_samples(buffer_.data() + used * bytes, layout_, n, info_.format,
+        convert_samples(buffer_.data() + used * bytes, layout_, n, info_,
                         runs.memory(run) + done * voxel_bytes(info_.format));
         used += n;
         done += n;
@@ -221,9 +256,9 @@ std::optional<uint64_t> SampleLayout::file_bytes(uint64_t voxels) const {
   return bytes;
 }
 
-void convert_samples(const std::byte* in, const SampleLayout& layout, int64_t count, VoxelFormat format,
+void convert_samples(const std::byte* in, const SampleLayout& layout, int64_t count, const VolumeInfo& info,
                      std::byte* out) {
-  if (same_layout(layout, format)) {
+  if (same_layout(layout, info.format)) {
     std::memcpy(out, in, static_cast<size_t>(count * layout.bytes_per_voxel()));
     return;
   }
@@ -244,21 +279,21 @@ void convert_samples(const std::byte* in, const SampleLayout& layout, int64_t co
                                      [](uint16_t v) { return static_cast<uint16_t>(v ^ 0x8000); });
     case SampleType::f32:
       return convert_words<uint32_t>(in, swapped, count, out, [](uint32_t v) { return v; });
+    case SampleType::f16:
+      return convert_words<uint16_t>(in, swapped, count, out, half_to_float);
     case SampleType::u32:
-      return convert_to_float<uint32_t>(in, swapped, count, out);
     case SampleType::i32:
-      return convert_to_float<int32_t>(in, swapped, count, out);
     case SampleType::u64:
-      return convert_to_float<uint64_t>(in, swapped, count, out);
     case SampleType::i64:
-      return convert_to_float<int64_t>(in, swapped, count, out);
+      return from_wide(in, swapped, count, info, out);
     case SampleType::f64:
       return convert_to_float<double>(in, swapped, count, out);
   }
 }
 
 Result<std::unique_ptr<VolumeSource>> mapped_source(std::shared_ptr<const MappedFile> file, uint64_t offset,
-                                                    const VolumeInfo& info, const SampleLayout& layout) {
+                                                    const VolumeInfo& info, const SampleLayout& layout,
+                                                    const OpenOptions& options, Context& ctx) {
   const auto voxels = checked_voxels(info.dims);
   const auto bytes = voxels ? layout.file_bytes(*voxels) : std::nullopt;
   if (!bytes) return bad_input(file->name(), "the volume is too large: expected at most 2^62 voxels");
@@ -267,12 +302,31 @@ Result<std::unique_ptr<VolumeSource>> mapped_source(std::shared_ptr<const Mapped
   if (*bytes > found)
     return bad_input(file->name(), fmt::format("voxel data at byte {} end after {} bytes: expected {}",
                                                offset, found, *bytes));
-  return std::make_unique<MappedSource>(std::move(file), offset, info, layout);
+  VolumeInfo held = info;
+  if (layout.type == SampleType::f64) {
+    VOX_TRY(held.rounded, rounds_doubles(file->bytes().subspan(offset, *bytes), layout.big_endian, ctx));
+    if (held.rounded) ctx.note(file->name() + ": " + rounding_note);
+  }
+  if (is_wide(layout.type)) {
+    held.sample_type = layout.type;
+    VOX_CHECK(fit_wide_integers(file->bytes().subspan(offset, *bytes), layout.big_endian, options.round_wide,
+                                file->name(), held, ctx));
+  }
+  return std::make_unique<MappedSource>(std::move(file), offset, held, layout);
 }
 
-std::unique_ptr<VolumeSource> streamed_source(std::unique_ptr<InputStream> stream, const VolumeInfo& info,
-                                              const SampleLayout& layout) {
-  return std::make_unique<StreamedSource>(std::move(stream), info, layout);
+Result<std::unique_ptr<VolumeSource>> streamed_source(std::unique_ptr<InputStream> stream,
+                                                      const VolumeInfo& info, const SampleLayout& layout,
+                                                      const OpenOptions& options, Context& ctx) {
+  if (layout.type == SampleType::f64) {  // whether some needs more is only known in the end
+    ctx.note(stream->name() + ": " + rounding_note);
+    VolumeInfo held = info;
+    held.rounded = true;
+    return std::make_unique<StreamedSource>(std::move(stream), held, layout);
+  }
+  if (!is_wide(layout.type)) return std::make_unique<StreamedSource>(std::move(stream), info, layout);
+  VOX_TRY(auto file, MappedFile::spool(*stream));
+  return mapped_source(std::move(file), 0, info, layout, options, ctx);
 }
 
 }  // namespace voxkit

@@ -272,9 +272,10 @@ class DicomSeries : public SlicedSource {
     info.slope = first.slope;
     info.intercept = first.intercept;
     if (first.pixel_spacing.size() == 2 && first.pixel_spacing[0] > 0 && first.pixel_spacing[1] > 0)
-      info.spacing = {first.pixel_spacing[1], first.pixel_spacing[0], 1};
-    if (distance > 0) info.spacing[2] = distance;
-    if (!first.position.empty()) info.origin = {first.position[0], first.position[1], first.position[2]};
+      info.affine = Affine::plain({first.pixel_spacing[1], first.pixel_spacing[0], 1}, {});
+    if (distance > 0) info.affine.axes[2][2] = distance;
+    if (!first.position.empty())
+      info.affine.origin = {first.position[0], first.position[1], first.position[2]};
     if (!checked_voxels(info.dims)) return bad_input(folder, "series has too many voxels");
     series->keep_slices(ctx);
     return series;
@@ -322,7 +323,7 @@ class DicomSeries : public SlicedSource {
   std::vector<DicomHeader> slices_;
 };
 
-SourceResult open_series(const std::string& folder, const std::string&, Context& ctx) {
+SourceResult open_series(const std::string& folder, const OpenOptions&, Context& ctx) {
   // The library reports on standard error, which is ours.
   gdcm::Trace::DebugOff();
   gdcm::Trace::WarningOff();

@@ -246,8 +246,7 @@ class ImageStack : public SlicedSource {
                                spec.nchannels, kind_.type, pixels)
             : input.read_scanlines(page, 0, top, bottom, spec.z, 0, spec.nchannels, kind_.type, pixels);
     if (!done) return bad_input(path, one_line(input.geterror()));
-    convert_samples(pixels + (y0 - begin) * row_bytes, kind_.layout, (y1 - y0) * info_.dims.x, kind_.format,
-                    rows);
+    convert_samples(pixels + (y0 - begin) * row_bytes, kind_.layout, (y1 - y0) * info_.dims.x, info_, rows);
     return {};
   }
 
@@ -260,7 +259,7 @@ class ImageStack : public SlicedSource {
   std::vector<std::unique_ptr<ImageInput>> idle_;
 };
 
-SourceResult open_stack(const std::string& name, const std::string&, Context& ctx) {
+SourceResult open_stack(const std::string& name, const OpenOptions&, Context& ctx) {
   try {
     limit_image_size(ctx);
     std::error_code ignored;

@@ -68,48 +68,7 @@ bool known_mode(int32_t mode) {
   return (mode >= 0 && mode <= 4) || mode == 6 || mode == 12 || mode == 16 || mode == 101;
 }
 
-/// The exact value of an IEEE half.
-float half_to_float(uint16_t half) {
-  const uint32_t sign = static_cast<uint32_t>(half & 0x8000) << 16;
-  const uint32_t exponent = half >> 10 & 0x1f, mantissa = half & 0x3ff;
-  if (exponent == 0) {
-    const float value = static_cast<float>(mantissa) * 0x1p-24f;
-    return std::bit_cast<float>(std::bit_cast<uint32_t>(value) | sign);
-  }
-  if (exponent == 31) return std::bit_cast<float>(sign | 0x7f800000 | mantissa << 13);
-  return std::bit_cast<float>(sign | (exponent + 112) << 23 | mantissa << 13);
-}
-
-/// Mode 12: halves, read as 16-bit words and widened.
-class HalfSource final : public VolumeSource {
- public:
-  HalfSource(std::unique_ptr<VolumeSource> words, const VolumeInfo& info) : words_(std::move(words)) {
-    info_ = info;
-  }
-  Status read(const Box& box, VoxelSpan out) override {
-    constexpr int64_t batch = 4096;
-    std::array<uint16_t, batch> words;
-    for (int64_t z = box.lo.z; z < box.hi.z; ++z)
-      for (int64_t y = box.lo.y; y < box.hi.y; ++y) {
-        std::byte* row = out.row(y - box.lo.y, z - box.lo.z);
-        for (int64_t x = box.lo.x; x < box.hi.x; x += batch) {
-          const int64_t n = std::min(batch, box.hi.x - x);
-          VOX_CHECK(words_->read({{x, y, z}, {x + n, y + 1, z + 1}},
-                                 {reinterpret_cast<std::byte*>(words.data()), 0, 0}));
-          for (int64_t i = 0; i < n; ++i, row += 4) {
-            const float value = half_to_float(words[static_cast<size_t>(i)]);
-            std::memcpy(row, &value, 4);
-          }
-        }
-      }
-    return {};
-  }
-
- private:
-  std::unique_ptr<VolumeSource> words_;
-};
-
-/// Type of the samples; halves are u16 here.
+/// Type of the samples.
 Result<SampleType> sample_type(const Header& header, const std::string& name) {
   const int32_t mode = header.get<int32_t>(at_mode);
   switch (mode) {
@@ -123,8 +82,9 @@ Result<SampleType> sample_type(const Header& header, const std::string& name) {
     case 2:
       return SampleType::f32;
     case 6:
-    case 12:
       return SampleType::u16;
+    case 12:
+      return SampleType::f16;
     default:
       return bad_input(
           name, fmt::format("MRC header: mode {} at byte {} is unsupported: expected 0, 1, 2, 6 or 12", mode,
@@ -147,13 +107,13 @@ Status parse_placement(const Header& header, const std::string& name, VolumeInfo
   for (size_t i = 0; i < 3; ++i) {
     const float cell = header.get<float>(at_cell + 4 * i);
     const int32_t samples = header.get<int32_t>(at_samples + 4 * i);
-    if (cell > 0 && std::isfinite(cell) && samples > 0) info.spacing[i] = double{cell} / samples;
+    if (cell > 0 && std::isfinite(cell) && samples > 0) info.affine.axes[i][i] = double{cell} / samples;
     const float origin = header.get<float>(at_origin + 4 * i);
     placed |= origin != 0;
-    if (std::isfinite(origin)) info.origin[i] = origin;
+    if (std::isfinite(origin)) info.affine.origin[i] = origin;
   }
   for (size_t i = 0; i < 3 && !placed; ++i)
-    info.origin[i] = header.get<int32_t>(at_start + 4 * i) * info.spacing[i];
+    info.affine.origin[i] = header.get<int32_t>(at_start + 4 * i) * info.affine.axes[i][i];
   return {};
 }
 
@@ -224,10 +184,10 @@ Header make_header(const VolumeInfo& info, const SampleLayout& layout) {
     const int32_t side = static_cast<int32_t>(info.dims[static_cast<int>(i)]);
     header.set(at_dims + 4 * i, side);
     header.set(at_samples + 4 * i, side);
-    header.set(at_cell + 4 * i, static_cast<float>(info.spacing[i] * side));
+    header.set(at_cell + 4 * i, static_cast<float>(info.affine.axes[i][i] * side));
     header.set(at_angles + 4 * i, 90.0f);
     header.set(at_axes + 4 * i, static_cast<int32_t>(i + 1));
-    header.set(at_origin + 4 * i, static_cast<float>(info.origin[i]));
+    header.set(at_origin + 4 * i, static_cast<float>(info.affine.origin[i]));
   }
   int32_t mode = 0;
   if (layout.type == SampleType::i16) mode = 1;
@@ -251,7 +211,7 @@ Header make_header(const VolumeInfo& info, const SampleLayout& layout) {
 
 }  // namespace
 
-SourceResult open_mrc(const std::string& path, Context&) {
+SourceResult open_mrc(const std::string& path, const OpenOptions& options, Context& ctx) {
   VOX_TRY(auto file, MappedFile::open(path));
   if (file->bytes().size() < header_bytes)
     return bad_input(
@@ -282,18 +242,10 @@ SourceResult open_mrc(const std::string& path, Context&) {
                           size_t{at_symmetry}));
   const SampleLayout layout{info.sample_type, 1, header.big_endian};
   const uint64_t offset = header_bytes + static_cast<uint64_t>(symmetry);
-  const bool half = header.get<int32_t>(at_mode) == 12;
-  const VolumeInfo stored = info;
-  if (half) {
-    info.format = VoxelFormat::float32;
-    info.sample_type = SampleType::f32;
-  }
   const float lo = header.get<float>(at_range), hi = header.get<float>(at_range + 4);
   if (info.format == VoxelFormat::float32 && lo < hi && std::isfinite(lo) && std::isfinite(hi))
     info.range = ValueRange{lo, hi};
-  VOX_TRY(auto source, mapped_source(std::move(file), offset, half ? stored : info, layout));
-  if (half) return std::make_unique<HalfSource>(std::move(source), info);
-  return source;
+  return mapped_source(std::move(file), offset, info, layout, options, ctx);
 }
 
 SinkResult create_mrc(const std::string& path, const VolumeInfo& info, bool force, Context&) {

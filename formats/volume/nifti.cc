@@ -92,8 +92,8 @@ Status parse_scale(double slope, double intercept, VolumeInfo& info) {
 void place(int axis, double spacing, double origin, VolumeInfo& info) {
   const size_t i = static_cast<size_t>(axis);
   spacing = std::abs(spacing);
-  if (spacing > 0 && std::isfinite(spacing)) info.spacing[i] = spacing;
-  if (std::isfinite(origin)) info.origin[i] = origin;
+  if (spacing > 0 && std::isfinite(spacing)) info.affine.axes[i][i] = spacing;
+  if (std::isfinite(origin)) info.affine.origin[i] = origin;
 }
 
 Result<Nifti> parse_nifti1(const std::string& name, nifti_1_header header) {
@@ -229,15 +229,15 @@ nifti_1_header make_header(const VolumeInfo& info, const SampleLayout& layout) {
       header.datatype = static_cast<short>(t.code);
   header.bitpix = static_cast<short>(8 * layout.bytes_per_voxel());
   for (float& side : header.pixdim) side = 1;
-  for (size_t i = 0; i < 3; ++i) header.pixdim[i + 1] = static_cast<float>(info.spacing[i]);
+  for (size_t i = 0; i < 3; ++i) header.pixdim[i + 1] = static_cast<float>(info.affine.axes[i][i]);
   header.vox_offset = 352;
   header.scl_slope = static_cast<float>(info.slope);
   header.scl_inter = static_cast<float>(info.intercept);
   // The placement in both forms, since readers differ in which they look at.
   header.qform_code = header.sform_code = NIFTI_XFORM_SCANNER_ANAT;
-  header.qoffset_x = header.srow_x[3] = static_cast<float>(info.origin[0]);
-  header.qoffset_y = header.srow_y[3] = static_cast<float>(info.origin[1]);
-  header.qoffset_z = header.srow_z[3] = static_cast<float>(info.origin[2]);
+  header.qoffset_x = header.srow_x[3] = static_cast<float>(info.affine.origin[0]);
+  header.qoffset_y = header.srow_y[3] = static_cast<float>(info.affine.origin[1]);
+  header.qoffset_z = header.srow_z[3] = static_cast<float>(info.affine.origin[2]);
   header.srow_x[0] = header.pixdim[1];
   header.srow_y[1] = header.pixdim[2];
   header.srow_z[2] = header.pixdim[3];
@@ -247,7 +247,7 @@ nifti_1_header make_header(const VolumeInfo& info, const SampleLayout& layout) {
 
 }  // namespace
 
-SourceResult open_nifti(const std::string& path, Context&) {
+SourceResult open_nifti(const std::string& path, const OpenOptions& options, Context& ctx) {
   VOX_TRY(auto stream, open_stream(path));
   std::string first(2, '\0');
   VOX_TRY(const size_t count, stream->read(std::as_writable_bytes(std::span(first))));
@@ -259,13 +259,13 @@ SourceResult open_nifti(const std::string& path, Context&) {
   std::error_code error;
   if (!packed && std::filesystem::is_regular_file(path, error)) {
     VOX_TRY(auto file, MappedFile::open(path));
-    return mapped_source(std::move(file), nifti.offset, nifti.info, nifti.layout);
+    return mapped_source(std::move(file), nifti.offset, nifti.info, nifti.layout, options, ctx);
   }
   const auto voxels = checked_voxels(nifti.info.dims);
   if (!voxels || !nifti.layout.file_bytes(*voxels))
     return bad_input(path, "NIfTI header: too many voxels: expected at most 2^62");
   VOX_CHECK(stream->skip(nifti.offset - stream->position()));
-  return streamed_source(std::move(stream), nifti.info, nifti.layout);
+  return streamed_source(std::move(stream), nifti.info, nifti.layout, options, ctx);
 }
 
 SinkResult create_nifti(const std::string& path, const VolumeInfo& info, bool force, Context&) {

@@ -92,6 +92,7 @@ class TextStream final : public InputStream {
         stored = store<double>(token);
         break;
       case SampleType::bit:
+      case SampleType::f16:  // the format has neither
         break;
     }
     if (!stored) return wrong(token);
@@ -157,13 +158,14 @@ Result<std::unique_ptr<InputStream>> decode(const Nrrd& facts, const std::string
 }
 
 /// The data of one file: mapped where they lie in it as they are.
-SourceResult open_data(const Nrrd& facts, const std::string& path, std::unique_ptr<InputStream> stream) {
+SourceResult open_data(const Nrrd& facts, const std::string& path, std::unique_ptr<InputStream> stream,
+                       const OpenOptions& options, Context& ctx) {
   VOX_TRY(auto samples, decode(facts, path, std::move(stream), facts.bytes));
   std::error_code error;
   if (facts.encoding != Encoding::raw || path.empty() || !fs::is_regular_file(path, error))
-    return streamed_source(std::move(samples), facts.info, facts.layout);
+    return streamed_source(std::move(samples), facts.info, facts.layout, options, ctx);
   VOX_TRY(auto file, MappedFile::open(path));
-  return mapped_source(std::move(file), samples->position(), facts.info, facts.layout);
+  return mapped_source(std::move(file), samples->position(), facts.info, facts.layout, options, ctx);
 }
 
 /// The names of several data files: a list, or a printf pattern with a range of numbers.
@@ -248,7 +250,8 @@ std::optional<Parts> parse_pattern(const std::vector<std::string_view>& tokens) 
 }
 
 SourceResult open_parts(const Header& header, const Nrrd& facts, Parts parts,
-                        std::optional<std::string_view> subdim, const fs::path& folder) {
+                        std::optional<std::string_view> subdim, const fs::path& folder,
+                        const OpenOptions& options, Context& ctx) {
   const int dimension = subdim ? number<int>(*subdim).value_or(0) : std::max(1, facts.dimension - 1);
   if (dimension < 1 || dimension > facts.dimension)
     return header.wrong("datafile", fmt::format("files of 1 to {} axes", facts.dimension));
@@ -263,14 +266,15 @@ SourceResult open_parts(const Header& header, const Nrrd& facts, Parts parts,
                         : count > 0 && static_cast<uint64_t>(facts.sizes.back()) % count == 0;
   if (!fits) return header.wrong("datafile", fmt::format("{} files, not {}", pieces, count));
   return streamed_source(std::make_unique<PartsStream>(facts, std::move(parts), folder, header.name),
-                         facts.info, facts.layout);
+                         facts.info, facts.layout, options, ctx);
 }
 
-SourceResult open_nrrd(const std::string& path, std::unique_ptr<InputStream> stream) {
+SourceResult open_nrrd(const std::string& path, std::unique_ptr<InputStream> stream,
+                       const OpenOptions& options, Context& ctx) {
   VOX_TRY(const Header header, nrrd::read_header(*stream));
   VOX_TRY(const Nrrd facts, nrrd::interpret(header));
   const nrrd::Field* data = header.find("datafile");
-  if (!data) return open_data(facts, path, std::move(stream));
+  if (!data) return open_data(facts, path, std::move(stream), options, ctx);
   fs::path folder = fs::path(path).parent_path();
   if (folder.empty()) folder = ".";  // also keeps a data file called "-" a file
   const auto tokens = nrrd::words(data->value);
@@ -279,14 +283,14 @@ SourceResult open_nrrd(const std::string& path, std::unique_ptr<InputStream> str
     Parts parts;
     parts.listed = header.listed;
     parts.count = static_cast<int64_t>(header.listed.size());
-    return open_parts(header, facts, std::move(parts), token(1), folder);
+    return open_parts(header, facts, std::move(parts), token(1), folder, options, ctx);
   }
   if (auto parts = parse_pattern(tokens))
-    return open_parts(header, facts, std::move(*parts), token(4), folder);
+    return open_parts(header, facts, std::move(*parts), token(4), folder, options, ctx);
   if (data->value.empty()) return header.wrong("datafile", "the name of a file");
   const std::string data_path = (folder / data->value).string();
   VOX_TRY(auto samples, open_stream(data_path));
-  return open_data(facts, data_path, std::move(samples));
+  return open_data(facts, data_path, std::move(samples), options, ctx);
 }
 
 /// Samples in NAME.raw, then the header: who finds the header finds the data.
@@ -303,13 +307,13 @@ class DetachedSink final : public DenseSink {
 
 }  // namespace
 
-SourceResult open_nrrd(const std::string& path, Context&) {
+SourceResult open_nrrd(const std::string& path, const OpenOptions& options, Context& ctx) {
   VOX_TRY(auto stream, open_stream(path));
-  return open_nrrd(path == "-" ? std::string() : path, std::move(stream));
+  return open_nrrd(path == "-" ? std::string() : path, std::move(stream), options, ctx);
 }
 
-SourceResult open_nrrd(std::unique_ptr<InputStream> stream, Context&) {
-  return open_nrrd(std::string(), std::move(stream));
+SourceResult open_nrrd(std::unique_ptr<InputStream> stream, const OpenOptions& options, Context& ctx) {
+  return open_nrrd(std::string(), std::move(stream), options, ctx);
 }
 
 SinkResult create_nrrd(const std::string& path, const VolumeInfo& info, bool force, Context&) {

@@ -159,13 +159,13 @@ Status parse_placement(const Header& header, int dimension, int first, int axes,
     if (spacing == 0)
       return header.wrong(header.find("spacedirections") ? "spacedirections" : "spacings",
                           "steps that are not zero");
-    if (std::isfinite(spacing)) info.spacing[k] = spacing;
-    if (!std::isnan(mins[axis])) info.origin[k] = mins[axis] + (cell ? info.spacing[k] / 2 : 0);
+    if (std::isfinite(spacing)) info.affine.axes[k][k] = spacing;
+    if (!std::isnan(mins[axis])) info.affine.origin[k] = mins[axis] + (cell ? info.affine.axes[k][k] / 2 : 0);
   }
   if (header.find("spaceorigin")) {
     VOX_TRY(const auto origin, parse_vectors(header, "spaceorigin", 1));
     for (size_t i = 0; i < std::min<size_t>(3, origin[0].size()); ++i)
-      if (!std::isnan(origin[0][i])) info.origin[i] = origin[0][i];
+      if (!std::isnan(origin[0][i])) info.affine.origin[i] = origin[0][i];
   }
   return {};
 }
@@ -365,14 +365,16 @@ std::string header_text(const VolumeInfo& info, const SampleLayout& layout, cons
   const std::string sizes = fmt::format("{} {} {}", info.dims.x, info.dims.y, info.dims.z);
   line("sizes", coloured ? fmt::format("{} {}", layout.components, sizes) : sizes);
   // Not `spacings`, which the format does not allow beside an origin in space.
-  line("space directions", fmt::format("{}({},0,0) (0,{},0) (0,0,{})", coloured ? "none " : "",
-                                       info.spacing[0], info.spacing[1], info.spacing[2]));
+  line("space directions",
+       fmt::format("{}({},0,0) (0,{},0) (0,0,{})", coloured ? "none " : "", info.affine.axes[0][0],
+                   info.affine.axes[1][1], info.affine.axes[2][2]));
   if (coloured)
     line("kinds",
          fmt::format("{} domain domain domain", layout.components == 4 ? "RGBA-color" : "RGB-color"));
   if (sample_bytes(layout.type) > 1) line("endian", "little");
   line("encoding", "raw");
-  line("space origin", fmt::format("({},{},{})", info.origin[0], info.origin[1], info.origin[2]));
+  line("space origin",
+       fmt::format("({},{},{})", info.affine.origin[0], info.affine.origin[1], info.affine.origin[2]));
   if (info.slope != 1) text += fmt::format("{}:={}\n", slope_key, info.slope);
   if (info.intercept != 0) text += fmt::format("{}:={}\n", intercept_key, info.intercept);
   if (info.format == VoxelFormat::bitmap) text += fmt::format("{}:=BITMAP\n", format_key);

@@ -71,31 +71,31 @@ auto unknown_output(const std::string& name) {
 
 Result<std::unique_ptr<VolumeSource>> open_volume(const std::string& name, const OpenOptions& options,
                                                   Context& ctx) {
-  if (name == "-") return open_nrrd(name, ctx);
+  if (name == "-") return open_nrrd(name, options, ctx);
   if (is_builtin(name)) return open_builtin(name);
   std::error_code error;
   const fs::file_status status = fs::status(name, error);
   if (!fs::exists(status)) {
-    if (is_numbered(name)) return open_image_stack(name, ctx);
+    if (is_numbered(name)) return open_image_stack(name, options, ctx);
     return bad_input(name, error ? error.message() : "No such file or directory");
   }
   if (fs::is_directory(status)) {
     VOX_TRY(const bool dicom, holds_dicom(name));
-    return dicom ? open_dicom(name, ctx) : open_image_stack(name, ctx);
+    return dicom ? open_dicom(name, options, ctx) : open_image_stack(name, options, ctx);
   }
   switch (kind_of(name)) {
     case Kind::nrrd:
-      return open_nrrd(name, ctx);
+      return open_nrrd(name, options, ctx);
     case Kind::nifti:
-      return open_nifti(name, ctx);
+      return open_nifti(name, options, ctx);
     case Kind::mrc:
-      return open_mrc(name, ctx);
+      return open_mrc(name, options, ctx);
     case Kind::raw:
       return open_raw(name, options, ctx);
     case Kind::vdb:
-      return open_vdb(name, options.grid, ctx);
+      return open_vdb(name, options, ctx);
     case Kind::image:
-      return open_image_stack(name, ctx);
+      return open_image_stack(name, options, ctx);
     case Kind::none:
       break;
   }

@@ -163,8 +163,9 @@ class VdbSource : public VolumeSource {
                                                                     static_cast<double>(source->min_.y),
                                                                     static_cast<double>(source->min_.z)));
     for (int axis = 0; axis < 3; ++axis) {
-      if (std::isfinite(size[axis]) && size[axis] > 0) info.spacing[static_cast<size_t>(axis)] = size[axis];
-      if (std::isfinite(corner[axis])) info.origin[static_cast<size_t>(axis)] = corner[axis];
+      if (std::isfinite(size[axis]) && size[axis] > 0)
+        info.affine.axes[static_cast<size_t>(axis)][static_cast<size_t>(axis)] = size[axis];
+      if (std::isfinite(corner[axis])) info.affine.origin[static_cast<size_t>(axis)] = corner[axis];
     }
     return source;
   }
@@ -296,7 +297,8 @@ uint64_t memory_of(const VdbTree& tree) {
          tree.leaves * (sizeof(Leaf) + Leaf::SIZE * sizeof(typename Tree::ValueType));
 }
 
-SourceResult open_grid(const std::string& path, const std::string& name, Context& ctx) {
+SourceResult open_grid(const std::string& path, const OpenOptions& options, Context& ctx) {
+  const std::string& name = options.grid;
   std::ifstream stream(path, std::ios_base::binary | std::ios_base::ate);
   if (!stream) return bad_input(path, "cannot open the file");
   const int64_t size = stream.tellg();
@@ -349,8 +351,8 @@ class VdbSink : public VolumeSink {
       : info_(info), file_(std::move(file)), memory_(*memory), grid_(Grid::create()) {
     openvdb::math::Mat4d matrix = openvdb::math::Mat4d::identity();
     for (int axis = 0; axis < 3; ++axis) {
-      const double spacing = info.spacing[static_cast<size_t>(axis)],
-                   origin = info.origin[static_cast<size_t>(axis)];
+      const double spacing = info.affine.axes[static_cast<size_t>(axis)][static_cast<size_t>(axis)],
+                   origin = info.affine.origin[static_cast<size_t>(axis)];
       matrix(axis, axis) = std::isfinite(spacing) && spacing > 0 ? spacing : 1;
       matrix(3, axis) = std::isfinite(origin) ? origin : 0;
     }
@@ -423,7 +425,7 @@ class VdbSink : public VolumeSink {
       } else {
         int32_t stored = static_cast<int32_t>(voxel[0]);
         if (info_.format == VoxelFormat::density16) stored |= static_cast<int32_t>(voxel[1]) << 8;
-        value = static_cast<float>(stored - info_.bias());
+        value = static_cast<float>(stored - static_cast<double>(info_.bias()));
       }
       return value != 0;
     } else {

@@ -20,13 +20,14 @@ struct RawType {
 constexpr RawType raw_types[] = {
     {"u8", SampleType::u8, 1},    {"i8", SampleType::i8, 1},   {"u16", SampleType::u16, 1},
     {"i16", SampleType::i16, 1},  {"u32", SampleType::u32, 1}, {"i32", SampleType::i32, 1},
+    {"u64", SampleType::u64, 1},  {"i64", SampleType::i64, 1}, {"f16", SampleType::f16, 1},
     {"f32", SampleType::f32, 1},  {"f64", SampleType::f64, 1}, {"rgb8", SampleType::u8, 3},
     {"rgba8", SampleType::u8, 4}, {"bit", SampleType::bit, 1},
 };
 
 }  // namespace
 
-SourceResult open_raw(const std::string& path, const OpenOptions& options, Context&) {
+SourceResult open_raw(const std::string& path, const OpenOptions& options, Context& ctx) {
   if (!options.dims || !options.type)
     return fail(
         ErrorCode::usage, path,
@@ -38,8 +39,8 @@ SourceResult open_raw(const std::string& path, const OpenOptions& options, Conte
   for (const RawType& t : raw_types)
     if (t.name == *options.type) type = &t;
   if (!type)
-    return bad_usage(
-        fmt::format("--type {}: expected u8 i8 u16 i16 u32 i32 f32 f64 rgb8 rgba8 or bit", *options.type));
+    return bad_usage(fmt::format(
+        "--type {}: expected u8 i8 u16 i16 u32 i32 u64 i64 f16 f32 f64 rgb8 rgba8 or bit", *options.type));
   VolumeInfo info;
   info.dims = *options.dims;
   info.sample_type = type->type;
@@ -56,7 +57,7 @@ SourceResult open_raw(const std::string& path, const OpenOptions& options, Conte
   if (file->bytes().size() != *bytes)
     return bad_input(path, fmt::format("is {} bytes long: expected {} for --dims {} --type {}",
                                        file->bytes().size(), *bytes, dims, type->name));
-  return mapped_source(std::move(file), 0, info, layout);
+  return mapped_source(std::move(file), 0, info, layout, options, ctx);
 }
 
 SinkResult create_raw(const std::string& path, const VolumeInfo& info, bool force, Context&) {

@@ -21,8 +21,8 @@ using SinkResult = Result<std::unique_ptr<VolumeSink>>;
 // nrrd.cc: http://teem.sourceforge.net/nrrd/format.html. Attached (.nrrd, or a stream) and detached (.nhdr)
 // headers; raw, gzip, bzip2 and ascii data; both endians; every integer and floating type; 3 axes of scalars,
 // or 4 with 3 or 4 u8 components first.
-SourceResult open_nrrd(const std::string& path, Context& ctx);
-SourceResult open_nrrd(std::unique_ptr<InputStream> stream, Context& ctx);
+SourceResult open_nrrd(const std::string& path, const OpenOptions& options, Context& ctx);
+SourceResult open_nrrd(std::unique_ptr<InputStream> stream, const OpenOptions& options, Context& ctx);
 /// Raw little-endian data with attached header; .nhdr: header and, beside it, NAME.raw.
 SinkResult create_nrrd(const std::string& path, const VolumeInfo& info, bool force, Context& ctx);
 
@@ -32,12 +32,12 @@ SinkResult create_raw(const std::string& path, const VolumeInfo& info, bool forc
 
 // nifti.cc: NIfTI-1 and NIfTI-2 single files, .nii and .nii.gz, one time step (header by niftiio, voxels
 // streamed or mapped). Written as NIfTI-1: sides up to 32767.
-SourceResult open_nifti(const std::string& path, Context& ctx);
+SourceResult open_nifti(const std::string& path, const OpenOptions& options, Context& ctx);
 SinkResult create_nifti(const std::string& path, const VolumeInfo& info, bool force, Context& ctx);
 
 // mrc.cc: MRC2014 / CCP4 maps, modes 0, 1, 2, 6 (and 12 = half float), both endians, any axis order that is
 // x, y, z.
-SourceResult open_mrc(const std::string& path, Context& ctx);
+SourceResult open_mrc(const std::string& path, const OpenOptions& options, Context& ctx);
 SinkResult create_mrc(const std::string& path, const VolumeInfo& info, bool force, Context& ctx);
 
 // builtin.cc: names such as "menger:5"; the volumes are in builtin_*.cc, generated region by region.
@@ -45,13 +45,13 @@ SourceResult open_builtin(const std::string& name);
 
 // volume_module.cc: readers and writers whose libraries are heavy live in modules that are loaded when a file
 // needs them: image_stack.cc (OpenImageIO), openvdb.cc, dicom.cc (GDCM).
-SourceResult open_image_stack(const std::string& pattern_or_folder, Context& ctx);
+SourceResult open_image_stack(const std::string& pattern_or_folder, const OpenOptions& options, Context& ctx);
 SinkResult create_image_stack(const std::string& pattern, const VolumeInfo& info, bool force, Context& ctx);
-SourceResult open_vdb(const std::string& path, const std::string& grid, Context& ctx);
+SourceResult open_vdb(const std::string& path, const OpenOptions& options, Context& ctx);
 SinkResult create_vdb(const std::string& path, const VolumeInfo& info, bool force, Context& ctx);
 /// A grid of Vec3s, in [0, 1] as stored, of which the voxels that come are active. Memory: 6 KiB for each
 /// cube of 8 voxels a side that has any. Errors: those of create_vdb; ErrorCode::limit.
 VoxelSinkResult create_vdb_voxels(const std::string& path, const VolumeInfo& info, bool force, Context& ctx);
-SourceResult open_dicom(const std::string& folder, Context& ctx);
+SourceResult open_dicom(const std::string& folder, const OpenOptions& options, Context& ctx);
 
 }  // namespace voxkit

@@ -12,9 +12,10 @@ const ModuleNeed read_images{"image_stack", "reading image stacks", "libopenimag
 
 }  // namespace
 
-SourceResult open_image_stack(const std::string& pattern_or_folder, Context& ctx) {
+SourceResult open_image_stack(const std::string& pattern_or_folder, const OpenOptions& options,
+                              Context& ctx) {
   VOX_TRY(const ModuleTable* const module, load_module(read_images, pattern_or_folder));
-  return module->volume->open(pattern_or_folder, {}, ctx);
+  return module->volume->open(pattern_or_folder, options, ctx);
 }
 
 SinkResult create_image_stack(const std::string& pattern, const VolumeInfo& info, bool force, Context& ctx) {
@@ -22,9 +23,9 @@ SinkResult create_image_stack(const std::string& pattern, const VolumeInfo& info
   return module->volume->create(pattern, info, force, ctx);
 }
 
-SourceResult open_vdb(const std::string& path, const std::string& grid, Context& ctx) {
+SourceResult open_vdb(const std::string& path, const OpenOptions& options, Context& ctx) {
   VOX_TRY(const ModuleTable* const module, load_module(read_vdb, path));
-  return module->volume->open(path, grid, ctx);
+  return module->volume->open(path, options, ctx);
 }
 
 SinkResult create_vdb(const std::string& path, const VolumeInfo& info, bool force, Context& ctx) {
@@ -37,9 +38,9 @@ VoxelSinkResult create_vdb_voxels(const std::string& path, const VolumeInfo& inf
   return module->volume->create_voxels(path, info, force, ctx);
 }
 
-SourceResult open_dicom(const std::string& folder, Context& ctx) {
+SourceResult open_dicom(const std::string& folder, const OpenOptions& options, Context& ctx) {
   VOX_TRY(const ModuleTable* const module, load_module(read_dicom, folder));
-  return module->volume->open(folder, {}, ctx);
+  return module->volume->open(folder, options, ctx);
 }
 
 }  // namespace voxkit

@@ -7,8 +7,7 @@
 namespace voxkit {
 
 struct VolumeModule {
-  /// `grid` is the name of a grid (openvdb only), empty for the first.
-  SourceResult (*open)(const std::string& path, const std::string& grid, Context& ctx) = nullptr;
+  SourceResult (*open)(const std::string& path, const OpenOptions& options, Context& ctx) = nullptr;
   /// Null in modules that only read.
   SinkResult (*create)(const std::string& path, const VolumeInfo& info, bool force, Context& ctx) = nullptr;
   /// Voxels with colours, one by one (openvdb only): `create_vdb_voxels` of readers.h.

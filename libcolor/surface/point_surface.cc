@@ -115,7 +115,7 @@ class PartFile {
 class PointSurface final : public SurfaceSource {
  public:
   PointSurface(std::unique_ptr<const PointCloud> points, VolumeInfo info, const glm::dvec3& lo)
-      : points_(std::move(points)), lo_(lo) {
+      : points_(std::move(points)), lo_(lo), edge_(info.affine.axes[0][0]) {
     info_ = std::move(info);
     info_.format = VoxelFormat::rgba32;
   }
@@ -158,13 +158,13 @@ class PointSurface final : public SurfaceSource {
     uint32_t at[3];
     for (int a = 0; a < 3; ++a)
       at[a] = static_cast<uint32_t>(std::clamp<int64_t>(
-          static_cast<int64_t>(std::floor((point.at[a] - lo_[a]) / info_.spacing[static_cast<size_t>(a)])), 0,
-          info_.dims[a] - 1));
+          static_cast<int64_t>(std::floor((point.at[a] - lo_[a]) / edge_)), 0, info_.dims[a] - 1));
     return morton_code(at[0], at[1], at[2]);
   }
 
   std::unique_ptr<const PointCloud> points_;
   glm::dvec3 lo_;
+  double edge_;  ///< of a voxel
 };
 
 }  // namespace
@@ -190,8 +190,8 @@ Result<std::unique_ptr<SurfaceSource>> surface_of_points(std::unique_ptr<const P
     const auto axis = static_cast<size_t>(a);
     info.dims[a] =
         std::clamp<int64_t>(static_cast<int64_t>(std::floor((hi[a] - lo[a]) / edge)) + 1, 1, resolution);
-    info.spacing[axis] = edge;
-    info.origin[axis] = lo[a] + edge / 2;
+    info.affine.axes[axis][axis] = edge;
+    info.affine.origin[axis] = lo[a] + edge / 2;
   }
   return std::make_unique<PointSurface>(std::move(points), std::move(info), lo);
 }

@@ -42,7 +42,7 @@ Result<std::unique_ptr<SurfaceSource>> surface_of(VoxelScene scene, Context& ctx
   VolumeInfo info;
   info.dims = hi - lo + Index3(1);
   for (size_t a = 0; a < 3; ++a)
-    info.origin[a] = static_cast<double>(lo[static_cast<Index3::length_type>(a)]) + 0.5;
+    info.affine.origin[a] = static_cast<double>(lo[static_cast<Index3::length_type>(a)]) + 0.5;
   if (std::max({info.dims.x, info.dims.y, info.dims.z}) > int64_t{1} << most_levels ||
       !checked_voxels(info.dims))
     return bad_input({}, fmt::format("a scene of {} x {} x {} voxels: expected at most {} a side",

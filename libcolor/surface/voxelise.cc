@@ -133,8 +133,8 @@ Grid fit(const Mesh& mesh, int64_t resolution) {
   for (int c = 0; c < 3; ++c) {
     const auto steps = static_cast<int64_t>(std::llround(size[c] * grid.scale));
     grid.info.dims[c] = std::clamp<int64_t>((steps + 255) / 256, 1, resolution);
-    grid.info.spacing[static_cast<size_t>(c)] = edge;
-    grid.info.origin[static_cast<size_t>(c)] = grid.lo[c] + edge / 2;
+    grid.info.affine.axes[static_cast<size_t>(c)][static_cast<size_t>(c)] = edge;
+    grid.info.affine.origin[static_cast<size_t>(c)] = grid.lo[c] + edge / 2;
   }
   return grid;
 }

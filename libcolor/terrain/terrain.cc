@@ -51,8 +51,7 @@ class Terrain final : public SurfaceSource {
     info_.dims = Index3(n, std::min(sampling_.height(), n), n);
     info_.format = VoxelFormat::rgba32;
     const double edge = 128 / static_cast<double>(n);
-    info_.spacing = {edge, edge, edge};
-    info_.origin = {edge / 2, 0, edge / 2};
+    info_.affine = Affine::plain({edge, edge, edge}, {edge / 2, 0, edge / 2});
     while (int64_t{1} << all_bits_ < n) ++all_bits_;
   }
 

@@ -203,12 +203,14 @@ TEST(MarschnerLobb, SamplesTheSignal) {
   for (int z = 0; z < 31; ++z)
     for (int y = 0; y < 31; ++y)
       for (int x = 0; x < 31; ++x) {
-        const auto at = [&](int k, size_t axis) { return info.origin[axis] + k * info.spacing[axis]; };
+        const auto at = [&](int k, size_t axis) {
+          return info.affine.origin[axis] + k * info.affine.spacing()[axis];
+        };
         const double rho = plain_marschner_lobb(at(x, 0), at(y, 1), at(z, 2));
         ASSERT_NEAR(info.slope * voxels[i++] + info.intercept, rho, 0.5000001 / 65535);
       }
   EXPECT_EQ(voxels[15 + 31 * 15], 65535);  // (0, 0, -1): the maximum
-  EXPECT_EQ(open("marschner-lobb:2")->info().spacing[0], 2);
+  EXPECT_EQ(open("marschner-lobb:2")->info().affine.spacing()[0], 2);
 }
 
 TEST(Sphere, EqualsTheDefinition) {

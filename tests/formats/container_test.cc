@@ -1,4 +1,5 @@
 #include "formats/container.h"
+#include "formats/volume_chunks.h"
 
 #include <gtest/gtest.h>
 
@@ -275,8 +276,8 @@ VolumeInfo some_info() {
   info.dims = {7, 5, 3};
   info.format = VoxelFormat::density16;
   info.sample_type = SampleType::i16;
-  info.spacing = {0.5, 1, 2.25};
-  info.origin = {-1, 2, 1e6};
+  info.affine = Affine::plain({0.5, 1, 2.25}, info.affine.origin);
+  info.affine.origin = {-1, 2, 1e6};
   info.slope = 0.25;
   info.intercept = -1024;
   info.range = ValueRange{-3, 70000};
@@ -289,13 +290,13 @@ TEST(VolumeInfoChunk, RoundTrip) {
     if (!with_range) info.range.reset();
     const Bytes bytes = pack_volume_info(info);
     ASSERT_EQ(bytes.size(), 112u);
-    const auto back = unpack_volume_info(bytes, "test");
+    const auto back = unpack_volume_info(bytes, {}, "test");
     ASSERT_TRUE(back);
     EXPECT_EQ(back->dims, info.dims);
     EXPECT_EQ(back->format, info.format);
     EXPECT_EQ(back->sample_type, info.sample_type);
-    EXPECT_EQ(back->spacing, info.spacing);
-    EXPECT_EQ(back->origin, info.origin);
+    EXPECT_EQ(back->affine.spacing(), info.affine.spacing());
+    EXPECT_EQ(back->affine.origin, info.affine.origin);
     EXPECT_EQ(back->slope, info.slope);
     EXPECT_EQ(back->intercept, info.intercept);
     EXPECT_EQ(back->range, info.range);
@@ -307,7 +308,7 @@ TEST(VolumeInfoChunk, BadValuesAreRefused) {
   const auto refused = [&](const std::string& word, const std::function<void(Bytes&)>& change) {
     Bytes bytes = good;
     change(bytes);
-    const auto info = unpack_volume_info(bytes, "test.svmm");
+    const auto info = unpack_volume_info(bytes, {}, "test.svmm");
     ASSERT_FALSE(info) << word;
     EXPECT_EQ(info.error().code, ErrorCode::input);
     EXPECT_EQ(info.error().file, "test.svmm");
@@ -360,8 +361,90 @@ TEST(VolumeInfoChunk, BadValuesAreRefused) {
       Bytes bytes = good;
       bytes[24] = static_cast<std::byte>(format);
       bytes[25] = static_cast<std::byte>(type);
-      ASSERT_EQ(unpack_volume_info(bytes, "test").has_value(), goes(format, type)) << format << " " << type;
+      ASSERT_EQ(unpack_volume_info(bytes, {}, "test").has_value(), goes(format, type))
+          << format << " " << type;
     }
+}
+
+VolumeInfo more_info() {
+  VolumeInfo info = some_info();
+  info.range.reset();
+  info.sample_type = SampleType::u32;
+  info.affine.axes = {{{0, 2, 0}, {-3, 0, 0.5}, {0.25, 0, -4}}};
+  info.world = World::lps;
+  info.unit = Unit::micrometre;
+  info.space_code = 4;
+  info.description = "a head, of \xc2\xb5m";
+  info.labels = std::make_shared<std::vector<int64_t>>(std::vector<int64_t>{0, 7, 4000000000});
+  info.is_labels = true;
+  info.fill = 1;
+  info.rounded = true;
+  return info;
+}
+
+TEST(VolumeFactsChunk, RoundTripInAFileOfVersion3) {
+  const VolumeInfo info = more_info();
+  EXPECT_EQ(container_version_for(info), 3);
+  MemoryBudget budget;
+  Bytes file;
+  ContainerWriter writer(
+      [&](std::span<const std::byte> bytes) -> Status {
+        file.insert(file.end(), bytes.begin(), bytes.end());
+        return {};
+      },
+      Codec::vq, container_version_for(info), 0, budget);
+  ASSERT_TRUE(add_volume_info(writer, info));
+  ASSERT_TRUE(writer.finish());
+  EXPECT_EQ(file[8], std::byte{3});
+  const auto container = Container::open(file, "test", nullptr);
+  ASSERT_TRUE(container);
+  const auto back = read_volume_info(**container);
+  ASSERT_TRUE(back) << back.error().what;
+  EXPECT_EQ(back->affine, info.affine);
+  EXPECT_EQ(back->world, info.world);
+  EXPECT_EQ(back->unit, info.unit);
+  EXPECT_EQ(back->space_code, info.space_code);
+  EXPECT_EQ(back->description, info.description);
+  EXPECT_EQ(*back->labels, *info.labels);
+  EXPECT_EQ(back->is_labels, info.is_labels);
+  EXPECT_EQ(back->fill, info.fill);
+  EXPECT_EQ(back->rounded, info.rounded);
+  EXPECT_EQ(back->sample_type, info.sample_type);
+  EXPECT_EQ(back->sample(2), 4000000000.0);
+}
+
+TEST(VolumeFactsChunk, WhatOldReadersUnderstandIsOfVersion1) {
+  EXPECT_EQ(container_version_for(some_info()), 1);
+  VolumeInfo flipped = some_info();
+  flipped.affine.axes[0][0] = -1;
+  EXPECT_EQ(container_version_for(flipped), 3);
+  VolumeInfo wide = some_info();
+  wide.sample_type = SampleType::i32;
+  EXPECT_EQ(container_version_for(wide), 3);
+}
+
+TEST(VolumeFactsChunk, BadValuesAreRefused) {
+  const Bytes info = pack_volume_info(more_info()), good = pack_volume_facts(more_info());
+  ASSERT_TRUE(unpack_volume_info(info, good, "test"));
+  const auto refused = [&](const std::string& word, const std::function<void(Bytes&)>& change) {
+    Bytes bytes = good;
+    change(bytes);
+    const auto read = unpack_volume_info(info, bytes, "test");
+    ASSERT_FALSE(read) << word;
+    EXPECT_EQ(read.error().code, ErrorCode::input);
+    EXPECT_NE(read.error().what.find(word), std::string::npos) << read.error().what;
+  };
+  for (size_t length = 1; length < good.size(); ++length)
+    refused("VOLX", [&](Bytes& b) { b.resize(length); });
+  refused("hold", [](Bytes& b) { b.push_back({}); });
+  refused("world", [](Bytes& b) { b[0] = std::byte{7}; });
+  refused("unit", [](Bytes& b) { b[1] = std::byte{8}; });
+  refused("flags", [](Bytes& b) { b[3] = std::byte{16}; });
+  refused("labels", [](Bytes& b) { store_le(&b[8], uint64_t{1} << 61); });
+  refused("labels", [](Bytes& b) { store_le(&b[8], uint64_t{65537}); });
+  refused("axes", [](Bytes& b) { store_le(&b[16], std::nan("")); });
+  refused("axes", [](Bytes& b) { std::fill(b.begin() + 16, b.begin() + 40, std::byte{0}); });
+  refused("label", [](Bytes& b) { store_le(&b[136], int64_t{-1}); });
 }
 
 }  // namespace

@@ -44,8 +44,8 @@ TEST_F(ConvertTest, CropMatchesAPlainLoop) {
   Shorts values(static_cast<size_t>(dims.x * dims.y * dims.z));
   std::iota(values.begin(), values.end(), uint16_t{0});
   VolumeInfo info = scalar_info(dims, SampleType::u16);
-  info.spacing = {1, 2, 3};
-  info.origin = {10, 20, 30};
+  info.affine = Affine::plain({1, 2, 3}, info.affine.origin);
+  info.affine.origin = {10, 20, 30};
   for (const Box& box :
        {Box{{1, 2, 3}, {22, 17, 9}}, Box{{0, 0, 4}, {23, 17, 5}}, Box{{22, 16, 10}, {23, 17, 11}}}) {
     Shorts expected;
@@ -57,7 +57,7 @@ TEST_F(ConvertTest, CropMatchesAPlainLoop) {
     ASSERT_TRUE(cropped);
     EXPECT_EQ(read_all<uint16_t>(**cropped), expected);
     EXPECT_EQ(read_all<uint16_t>(**cropped, {4, 3, 2}), expected);
-    EXPECT_EQ((*cropped)->info().origin[2], 30 + 3.0 * static_cast<double>(box.lo.z));
+    EXPECT_EQ((*cropped)->info().affine.origin[2], 30 + 3.0 * static_cast<double>(box.lo.z));
     auto forward = crop(std::make_unique<ForwardSource>(info, test::bytes_of(values)), box, ctx_);
     ASSERT_TRUE(forward);
     EXPECT_EQ(read_all<uint16_t>(**forward, {100, 100, 2}), expected);
@@ -227,7 +227,7 @@ TEST_F(ConvertTest, ResampleMatchesThePlainDefinition) {
   for (const Index3 to : {Index3(7, 6, 1), Index3(1, 1, 1), Index3(14, 12, 10), Index3(3, 9, 5),
                           Index3(4, 4, 4), Index3(20, 2, 3)}) {
     VolumeInfo info = colour_info(from, VoxelFormat::rgba32);
-    info.origin = {1, 2, 3};
+    info.affine.origin = {1, 2, 3};
     auto colours = resample(volume(info, values), to);
     ASSERT_TRUE(colours);
     const Bytes got = read_all<uint8_t>(**colours);
@@ -257,8 +257,9 @@ TEST_F(ConvertTest, ResampleMatchesThePlainDefinition) {
     // The outer faces stay where they are.
     const VolumeInfo& made = (*colours)->info();
     for (int a = 0; a < 3; ++a) {
-      EXPECT_DOUBLE_EQ(made.origin[a] - made.spacing[a] / 2, a + 0.5);
-      EXPECT_DOUBLE_EQ(made.origin[a] + made.spacing[a] * (double(to[a]) - 0.5), a + 0.5 + double(from[a]));
+      EXPECT_DOUBLE_EQ(made.affine.origin[a] - made.affine.spacing()[a] / 2, a + 0.5);
+      EXPECT_DOUBLE_EQ(made.affine.origin[a] + made.affine.spacing()[a] * (double(to[a]) - 0.5),
+                       a + 0.5 + double(from[a]));
     }
   }
 }

@@ -86,7 +86,7 @@ class Dicom : public FileFormatTest {
     if (!std::filesystem::exists(module_folder() + "/dicom.so")) GTEST_SKIP() << "built without GDCM";
   }
   Result<Bytes> read_folder(VolumeInfo* info = nullptr) {
-    VOX_TRY(const auto source, open_dicom(folder_, ctx_));
+    VOX_TRY(const auto source, open_dicom(folder_, {}, ctx_));
     if (info) *info = source->info();
     return read(*source);
   }
@@ -124,8 +124,8 @@ TEST_F(Dicom, SlicesAreOrderedByPositionAlongTheirNormal) {
   EXPECT_EQ(info.dims, Index3(2, 2, 4));
   EXPECT_EQ(info.format, VoxelFormat::density16);
   EXPECT_EQ(info.sample_type, SampleType::u16);
-  EXPECT_EQ(info.spacing, (std::array<double, 3>{0.25, 0.5, 2}));
-  EXPECT_EQ(info.origin, (std::array<double, 3>{1, 5, -6.5}));
+  EXPECT_EQ(info.affine.spacing(), (std::array<double, 3>{0.25, 0.5, 2}));
+  EXPECT_EQ(info.affine.origin, (std::array<double, 3>{1, 5, -6.5}));
   EXPECT_EQ(info.slope, 2);
   EXPECT_EQ(info.intercept, -1024.5);
   const std::string text(reinterpret_cast<const char*>(voxels->data()), voxels->size());
@@ -156,7 +156,7 @@ TEST_F(Dicom, UnevenDistancesGiveTheirMedian) {
         Slice{.position = fmt::format("0\\0\\{}", positions[i]), .orientation = "1\\0\\0\\0\\1\\0"}.bytes());
   VolumeInfo info;
   ASSERT_TRUE(read_folder(&info));
-  EXPECT_EQ(info.spacing[2], 1);
+  EXPECT_EQ(info.affine.spacing()[2], 1);
 }
 
 TEST_F(Dicom, SignedAndUnusedBits) {
@@ -299,7 +299,7 @@ TEST_F(Dicom, BoxesFromManyThreadsAreThoseOfTheWhole) {
        {uint64_t{100} << 20, uint64_t{60000}, uint64_t{10000}}) {  // all, few or no slices kept
     MemoryBudget memory(limit);
     ctx_.memory = &memory;
-    auto source = open_dicom(folder_, ctx_);
+    auto source = open_dicom(folder_, {}, ctx_);
     ASSERT_TRUE(source) << source.error().what;
     std::array<int, 4> wrong{};
     std::vector<std::thread> threads;

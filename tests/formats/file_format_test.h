@@ -97,8 +97,8 @@ class FileFormatTest : public testing::Test {
     auto source = open_volume(path(name), options, ctx_);
     ASSERT_TRUE(source) << source.error().what;
     EXPECT_EQ((*source)->info().dims, info.dims);
-    EXPECT_EQ((*source)->info().spacing, info.spacing);
-    EXPECT_EQ((*source)->info().origin, info.origin);
+    EXPECT_EQ((*source)->info().affine.spacing(), info.affine.spacing());
+    EXPECT_EQ((*source)->info().affine.origin, info.affine.origin);
     EXPECT_EQ((*source)->info().slope, info.slope);
     EXPECT_EQ((*source)->info().intercept, info.intercept);
     const auto back = read(**source);

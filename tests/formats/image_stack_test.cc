@@ -91,7 +91,7 @@ class ImageStack : public FileFormatTest {
     return write(*sink, info, voxels);
   }
   Result<Bytes> read_stack(const std::string& name, VolumeInfo* info = nullptr) {
-    VOX_TRY(const auto source, open_image_stack(path(name), ctx_));
+    VOX_TRY(const auto source, open_image_stack(path(name), {}, ctx_));
     if (info) *info = source->info();
     return read(*source);
   }
@@ -274,7 +274,7 @@ TEST_F(ImageStack, BoxesFromManyThreadsAreThoseOfTheWhole) {
     MemoryBudget memory(limit);
     ctx_.memory = &memory;
     {
-      auto source = open_image_stack(path("a%d.tif"), ctx_);
+      auto source = open_image_stack(path("a%d.tif"), {}, ctx_);
       ASSERT_TRUE(source) << source.error().what;
       std::array<int, 4> wrong{};
       std::vector<std::thread> threads;
@@ -382,7 +382,7 @@ TEST_F(ImageStack, DamagedFilesAreRefused) {
       for (auto n = 1 + random_() % 3; n > 0; --n)
         changed[random_() % changed.size()] = static_cast<char>(random_());
       put(name, changed);
-      const auto source = open_image_stack(path(name), ctx_);
+      const auto source = open_image_stack(path(name), {}, ctx_);
       if (source && (*source)->info().box().voxels() > 1000000) continue;
       const auto read = read_stack(name);
       ASSERT_TRUE(read || read.error().code == ErrorCode::input) << read.error().what;

@@ -49,7 +49,7 @@ TEST_F(MrcTest, EveryModeInBothOrders) {
                   sample_text<float>({-3.5, 1e9f}, false));
     expect_voxels(Header(6, dims, big).bytes + sample_text<uint16_t>({3, 1000}, big),
                   sample_text<uint16_t>({3, 1000}, false));
-    EXPECT_EQ(read_info_.spacing, (std::array<double, 3>{0.5, 1, 1.5}));
+    EXPECT_EQ(read_info_.affine.spacing(), (std::array<double, 3>{0.5, 1, 1.5}));
     expect_voxels(Header(12, dims, big).bytes + sample_text<uint16_t>({0x3c00, 0xc100}, big),
                   sample_text<float>({1, -2.5}, false));
     EXPECT_EQ(read_info_.sample_type, SampleType::f32);
@@ -110,11 +110,11 @@ TEST_F(MrcTest, RangeOriginAndSymmetryRecords) {
   expect_voxels(h.bytes + std::string(80, 's') + sample_text<float>({7}, false),
                 sample_text<float>({7}, false));
   EXPECT_EQ(read_info_.range, (ValueRange{-2, 8}));
-  EXPECT_EQ(read_info_.origin, (std::array<double, 3>{2, 0, 0}));
+  EXPECT_EQ(read_info_.affine.origin, (std::array<double, 3>{2, 0, 0}));
   h.set(200, 3.0f);
   expect_voxels(h.bytes + std::string(80, 's') + sample_text<float>({7}, false),
                 sample_text<float>({7}, false));
-  EXPECT_EQ(read_info_.origin, (std::array<double, 3>{0, 3, 0}));
+  EXPECT_EQ(read_info_.affine.origin, (std::array<double, 3>{0, 3, 0}));
   h.set(80, -2.0f);
   expect_voxels(h.bytes + std::string(80, 's') + sample_text<float>({7}, false),
                 sample_text<float>({7}, false));
@@ -127,8 +127,8 @@ TEST_F(MrcTest, WhatIsWrittenReadsBack) {
       for (SampleType type :
            {SampleType::u8, SampleType::i8, SampleType::u16, SampleType::i16, SampleType::f32}) {
         VolumeInfo info = make_info(dims, scalar_format(type), type);
-        info.spacing = {0.25, 2, 0.5};
-        info.origin = {-1.5, 0, 64};
+        info.affine = Affine::plain({0.25, 2, 0.5}, info.affine.origin);
+        info.affine.origin = {-1.5, 0, 64};
         round_trip(name, info);
         EXPECT_EQ(read_info_.sample_type, type);
       }

@@ -104,8 +104,8 @@ TEST_F(NiftiTest, ScaleAndPlacement) {
         h.number(292 + 16 * i, 424 + 32 * i, -20 - static_cast<double>(i));  // srow_*[3]
       }
       expect_voxels(h.bytes + "x", "x");
-      EXPECT_EQ(read_info_.spacing, (std::array<double, 3>{0.5, 1, 1.5}));
-      EXPECT_EQ(read_info_.origin, (std::array<double, 3>{0, 0, 0}));
+      EXPECT_EQ(read_info_.affine.spacing(), (std::array<double, 3>{0.5, 1, 1.5}));
+      EXPECT_EQ(read_info_.affine.origin, (std::array<double, 3>{0, 0, 0}));
       EXPECT_EQ(read_info_.slope, 2);
       EXPECT_EQ(read_info_.intercept, -1024);
       if (version == 1)
@@ -113,13 +113,13 @@ TEST_F(NiftiTest, ScaleAndPlacement) {
       else
         h.set<int32_t>(344, 1);
       expect_voxels(h.bytes + "x", "x");
-      EXPECT_EQ(read_info_.origin, (std::array<double, 3>{10, 11, 12}));
+      EXPECT_EQ(read_info_.affine.origin, (std::array<double, 3>{10, 11, 12}));
       if (version == 1)
         h.set<int16_t>(254, 1);  // sform_code
       else
         h.set<int32_t>(348, 1);
       expect_voxels(h.bytes + "x", "x");
-      EXPECT_EQ(read_info_.origin, (std::array<double, 3>{-20, -21, -22}));
+      EXPECT_EQ(read_info_.affine.origin, (std::array<double, 3>{-20, -21, -22}));
       h.number(112, 176, 0);
       expect_voxels(h.bytes + "x", "x");
       EXPECT_EQ(read_info_.slope, 1);
@@ -145,8 +145,8 @@ TEST_F(NiftiTest, WhatIsWrittenReadsBack) {
       for (SampleType type :
            {SampleType::u8, SampleType::i8, SampleType::u16, SampleType::i16, SampleType::f32}) {
         VolumeInfo info = make_info(dims, scalar_format(type), type);
-        info.spacing = {0.25, 2, 3};
-        info.origin = {-1.5, 0, 64};
+        info.affine = Affine::plain({0.25, 2, 3}, info.affine.origin);
+        info.affine.origin = {-1.5, 0, 64};
         info.slope = 0.5;
         info.intercept = -1024;
         round_trip(name, info);

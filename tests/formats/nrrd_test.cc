@@ -184,8 +184,8 @@ TEST_F(NrrdTest, PlacementAndKinds) {
            header({{"spacings", "0.5 2 nan"}, {"axis mins", "1 -1 nan"}, {"centers", "node cell node"}}) +
                "\n" + data_);
   ASSERT_TRUE(source) << source.error().what;
-  EXPECT_EQ((*source)->info().spacing, (std::array<double, 3>{0.5, 2, 1}));
-  EXPECT_EQ((*source)->info().origin, (std::array<double, 3>{1, 0, 0}));
+  EXPECT_EQ((*source)->info().affine.spacing(), (std::array<double, 3>{0.5, 2, 1}));
+  EXPECT_EQ((*source)->info().affine.origin, (std::array<double, 3>{1, 0, 0}));
 
   source = open("v.nrrd", header({{"space", "left-posterior-superior"},
                                   {"space directions", "(0,0,-0.1) ( 3, 4, 0 ) none"},
@@ -194,8 +194,8 @@ TEST_F(NrrdTest, PlacementAndKinds) {
                                   {"max", "1"}}) +
                               "\n" + data_);
   ASSERT_TRUE(source) << source.error().what;
-  EXPECT_EQ((*source)->info().spacing, (std::array<double, 3>{0.1, 5, 1}));
-  EXPECT_EQ((*source)->info().origin, (std::array<double, 3>{7, 8, -9.5}));
+  EXPECT_EQ((*source)->info().affine.spacing(), (std::array<double, 3>{0.1, 5, 1}));
+  EXPECT_EQ((*source)->info().affine.origin, (std::array<double, 3>{7, 8, -9.5}));
   EXPECT_FALSE((*source)->info().range);
 
   source = open("v.nrrd", header({{"dimension", "4"}, {"sizes", "3 2 2 2"}}) + "\n" + data_);
@@ -218,8 +218,8 @@ TEST_F(NrrdTest, WhatIsWrittenReadsBack) {
       for (SampleType type : {SampleType::u8, SampleType::i8, SampleType::u16, SampleType::i16,
                               SampleType::f32, SampleType::bit}) {
         info = make_info(dims, scalar_format(type), type);
-        info.spacing = {0.1, 1e-9, 12345.678};
-        info.origin = {-1.0 / 3, 0, 1e30};
+        info.affine = Affine::plain({0.1, 1e-9, 12345.678}, info.affine.origin);
+        info.affine.origin = {-1.0 / 3, 0, 1e30};
         info.slope = 0.7;
         info.intercept = -1024;
         round_trip(name, info);

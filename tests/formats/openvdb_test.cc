@@ -25,7 +25,7 @@ class OpenVdb : public FileFormatTest {
   /// Opens, with the whole volume in `voxels`.
   std::unique_ptr<VolumeSource> read_vdb(const std::string& name, Bytes& voxels,
                                          const std::string& grid = {}) {
-    auto source = open_vdb(path(name), grid, ctx_);
+    auto source = open_vdb(path(name), {.grid = grid}, ctx_);
     EXPECT_TRUE(source) << source.error().what;
     if (!source) return nullptr;
     auto all = read(**source);
@@ -68,8 +68,8 @@ class OpenVdb : public FileFormatTest {
 TEST_F(OpenVdb, FloatsComeBackWithPlaceAndEmptyBorders) {
   for (const Index3 dims : {Index3(1, 1, 1), Index3(8, 8, 8), Index3(13, 7, 5), Index3(150, 9, 20)}) {
     VolumeInfo info = make_info(dims, VoxelFormat::float32, SampleType::f32);
-    info.spacing = {0.5, 2, 0.25};
-    info.origin = {10, -20, 0.125};
+    info.affine = Affine::plain({0.5, 2, 0.25}, info.affine.origin);
+    info.affine.origin = {10, -20, 0.125};
     Bytes voxels = random_voxels(info);
     // An empty first slice: without the extent the active voxels would begin at z = 1.
     if (dims.z > 1) std::fill_n(voxels.begin(), dims.x * dims.y * 4, std::byte{0});
@@ -79,8 +79,8 @@ TEST_F(OpenVdb, FloatsComeBackWithPlaceAndEmptyBorders) {
     ASSERT_TRUE(source);
     EXPECT_EQ(source->info().dims, dims);
     EXPECT_EQ(source->info().format, VoxelFormat::float32);
-    EXPECT_EQ(source->info().spacing, info.spacing);
-    EXPECT_EQ(source->info().origin, info.origin);
+    EXPECT_EQ(source->info().affine.spacing(), info.affine.spacing());
+    EXPECT_EQ(source->info().affine.origin, info.affine.origin);
     EXPECT_EQ(back, voxels);
   }
 }
@@ -265,7 +265,7 @@ TEST_F(OpenVdb, GridsAreFoundByName) {
   ASSERT_TRUE(read_vdb("color.vdb", alone));
   EXPECT_EQ(named, alone);
 
-  const auto missing = open_vdb(path("both.vdb"), "fuel", ctx_);
+  const auto missing = open_vdb(path("both.vdb"), {.grid = "fuel"}, ctx_);
   ASSERT_FALSE(missing);
   EXPECT_EQ(missing.error().code, ErrorCode::input);
   EXPECT_NE(missing.error().what.find("density (Tree_float_5_4_3), color (Tree_vec3s_5_4_3)"),
@@ -276,7 +276,7 @@ TEST_F(OpenVdb, GridsAreFoundByName) {
   put("int.vdb", replaced(get(path("both.vdb")), "Tree_float_5_4_3", "Tree_int32_5_4_3"));
   ASSERT_TRUE(read_vdb("int.vdb", named));
   EXPECT_EQ(named, alone);
-  const auto refused = open_vdb(path("int.vdb"), "density", ctx_);
+  const auto refused = open_vdb(path("int.vdb"), {.grid = "density"}, ctx_);
   ASSERT_FALSE(refused);
   EXPECT_NE(refused.error().what.find("unsupported grid type Tree_int32_5_4_3"), std::string::npos);
   put("only.vdb", replaced(get(path("density.vdb")), "Tree_float_5_4_3", "Tree_int32_5_4_3"));
@@ -285,7 +285,7 @@ TEST_F(OpenVdb, GridsAreFoundByName) {
 
 TEST_F(OpenVdb, FilesOfOthersSpanTheirActiveVoxels) {
   VolumeInfo info = make_info({30, 20, 10}, VoxelFormat::float32, SampleType::f32);
-  info.spacing = {2, 2, 2};
+  info.affine = Affine::plain({2, 2, 2}, info.affine.origin);
   std::vector<float> values(30 * 20 * 10);
   const auto at = [&](int x, int y, int z) -> float& {
     return values[static_cast<size_t>((z * 20 + y) * 30 + x)];
@@ -298,7 +298,7 @@ TEST_F(OpenVdb, FilesOfOthersSpanTheirActiveVoxels) {
   const auto source = read_vdb("b.vdb", back);
   ASSERT_TRUE(source);
   EXPECT_EQ(source->info().dims, Index3(10, 10, 3));
-  EXPECT_EQ(source->info().origin, (std::array<double, 3>{6, 8, 10}));
+  EXPECT_EQ(source->info().affine.origin, (std::array<double, 3>{6, 8, 10}));
   EXPECT_EQ(floats_of(back).front(), 1);
   EXPECT_EQ(floats_of(back).back(), 2);
   EXPECT_EQ(std::count(back.begin(), back.end(), std::byte{0}), 10 * 10 * 3 * 4 - 3);

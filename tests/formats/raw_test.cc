@@ -36,26 +36,82 @@ TEST_F(RawTest, EveryTypeBecomesTheVoxelsItShould) {
   expect_voxels<int8_t, uint8_t>("i8", {-128, -1, 0, 127}, {0, 127, 128, 255});
   expect_voxels<uint16_t, uint16_t>("u16", {0, 258, 65535}, {0, 258, 65535});
   expect_voxels<int16_t, uint16_t>("i16", {-32768, -1, 0, 32767}, {0, 32767, 32768, 65535});
-  expect_voxels<uint32_t, float>("u32", {0, 16777217, 4294967295u}, {0, 16777216, 4294967296.0f});
-  expect_voxels<int32_t, float>("i32", {-2147483647, -5, 7}, {-2147483648.0f, -5, 7});
+  expect_voxels<uint32_t, uint8_t>("u32", {4294967295u, 0, 16777217, 0}, {2, 0, 1, 0});
+  expect_voxels<int32_t, uint16_t>("i32", {-2147483647, -2147483000, -2147483647}, {0, 647, 0});
   expect_voxels<float, float>("f32", {-1.5f, 3e38f, INFINITY}, {-1.5f, 3e38f, INFINITY});
   expect_voxels<double, float>("f64", {-1.5, 0.1, 1e300}, {-1.5f, 0.1f, INFINITY});
 }
 
-TEST_F(RawTest, SixtyFourBitSamplesAreRoundedOnce) {
-  for (bool big : {false, true}) {
-    const std::string u = sample_text<uint64_t>({0, UINT64_MAX, 1ull << 40}, big);
-    const std::string i = sample_text<int64_t>({INT64_MIN, -1, 9}, big);
-    float out[3];
-    convert_samples(reinterpret_cast<const std::byte*>(u.data()), {SampleType::u64, 1, big}, 3,
-                    VoxelFormat::float32, reinterpret_cast<std::byte*>(out));
-    EXPECT_EQ(out[1], 18446744073709551616.0f);
-    EXPECT_EQ(out[2], 1099511627776.0f);
-    convert_samples(reinterpret_cast<const std::byte*>(i.data()), {SampleType::i64, 1, big}, 3,
-                    VoxelFormat::float32, reinterpret_cast<std::byte*>(out));
-    EXPECT_EQ(out[0], -9223372036854775808.0f);
-    EXPECT_EQ(out[1], -1.0f);
+/// Integers of more than 16 bits come back as they were: by a base, by a table, or as floats that hold them.
+TEST_F(RawTest, WideIntegersAreExact) {
+  const auto round_trip = [&]<class T>(const char* type, const std::vector<T>& values, VoxelFormat expected) {
+    for (const bool big : {false, true}) {
+      put("wide.raw", sample_text<T>(values, big));
+      OpenOptions options;
+      options.dims = Index3(static_cast<int64_t>(values.size()), 1, 1);
+      options.type = type;
+      options.big_endian = big;
+      auto source = open_volume(path("wide.raw"), options, ctx_);
+      ASSERT_TRUE(source) << source.error().what;
+      const VolumeInfo info = (*source)->info();
+      EXPECT_EQ(info.format, expected) << type;
+      auto sink = create_volume(path("back.raw"), info, true, ctx_);
+      ASSERT_TRUE(sink);
+      ASSERT_TRUE(copy_volume(**source, info.box(), **sink, ctx_));
+      ASSERT_TRUE((*sink)->finish());
+      EXPECT_EQ(get("back.raw"), sample_text<T>(values, false)) << type;
+    }
+  };
+  round_trip("u32", std::vector<uint32_t>{4000000000u, 4000000255u, 4000000001u}, VoxelFormat::density8);
+  round_trip("i32", std::vector<int32_t>{-2147483647 - 1, -2147480000}, VoxelFormat::density16);
+  round_trip("i32", std::vector<int32_t>{-2147483647 - 1, 2147483647, 0, 5}, VoxelFormat::density8);
+  round_trip("u64", std::vector<uint64_t>{UINT64_MAX, 1, 0x8000000000000000u, 1}, VoxelFormat::density8);
+  round_trip("i64", std::vector<int64_t>{INT64_MIN, INT64_MAX, -1}, VoxelFormat::density8);
+  std::vector<uint32_t> many;
+  for (uint32_t i = 0; i < 65536; ++i) many.push_back(i * 65000u);
+  round_trip("u32", many, VoxelFormat::density16);
+  many.assign(1, 0);
+  for (uint32_t i = 0; i < 70000; ++i) many.push_back(i * 200u);
+  round_trip("u32", many, VoxelFormat::float32);
+}
+
+TEST_F(RawTest, WideIntegersThatNoFormatHoldsAreRefused) {
+  std::vector<uint32_t> values;
+  for (uint32_t i = 0; i < 65537; ++i) values.push_back(i * 65001u);
+  put("wide.raw", sample_text<uint32_t>(values, false));
+  OpenOptions options;
+  options.dims = Index3(65537, 1, 1);
+  options.type = "u32";
+  const auto refused = open_volume(path("wide.raw"), options, ctx_);
+  ASSERT_FALSE(refused);
+  EXPECT_EQ(refused.error().code, ErrorCode::input);
+  EXPECT_NE(refused.error().what.find("--type f32"), std::string::npos) << refused.error().what;
+  options.round_wide = true;
+  const auto rounded = open_volume(path("wide.raw"), options, ctx_);
+  ASSERT_TRUE(rounded);
+  EXPECT_TRUE((*rounded)->info().rounded);
+  float last = 0;
+  ASSERT_TRUE((*rounded)->read({{65536, 0, 0}, {65537, 1, 1}}, {reinterpret_cast<std::byte*>(&last), 0, 0}));
+  EXPECT_EQ(last, static_cast<float>(65536u * 65001u));
+}
+
+TEST_F(RawTest, DoublesSayWhenTheyAreRounded) {
+  OpenOptions options;
+  options.dims = Index3(2, 1, 1);
+  options.type = "f64";
+  for (const bool exact : {true, false}) {
+    put("double.raw", sample_text<double>({0.5, exact ? 0.25 : 0.1}, false));
+    std::string said;
+    ctx_.note = [&](const std::string& line) { said += line; };
+    const auto source = open_volume(path("double.raw"), options, ctx_);
+    ASSERT_TRUE(source);
+    EXPECT_EQ((*source)->info().rounded, !exact);
+    EXPECT_EQ(said.empty(), exact) << said;
   }
+}
+
+TEST_F(RawTest, HalfFloatsAreFloats) {
+  expect_voxels<uint16_t, float>("f16", {0x3c00, 0x0001, 0xfc00}, {1, 0x1p-24f, -INFINITY});
 }
 
 TEST_F(RawTest, BitsArePackedWithoutGapsLowestFirst) {

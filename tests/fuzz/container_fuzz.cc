@@ -1,5 +1,6 @@
 // Any bytes as a container: as they are, and with what opening asks for made right.
 #include "formats/container.h"
+#include "formats/volume_chunks.h"
 
 #include <cstdio>
 #include <cstdlib>
@@ -46,7 +47,7 @@ void read(const test::Bytes& file) {
   }
   if (const auto chunk = (*container)->only_chunk(volume_info_kind); !chunk) {
     expect_sound(chunk.error());
-  } else if (const auto info = unpack_volume_info(*chunk, "fuzz"); !info) {
+  } else if (const auto info = unpack_volume_info(*chunk, {}, "fuzz"); !info) {
     expect_sound(info.error());
   } else if (!checked_voxels(info->dims) || voxel_bytes(info->format) == 0) {
     stop("a volume that cannot be");

@@ -204,20 +204,21 @@ bool is_gzip(Input input) {
 
 Verdict read_nrrd(Input input) {
   const std::string path = put(input, "in.nrrd");
-  if (auto verdict = read_source([&](Context& ctx) { return open_nrrd(path, ctx); }); !verdict.fault.empty())
+  if (auto verdict = read_source([&](Context& ctx) { return open_nrrd(path, {}, ctx); });
+      !verdict.fault.empty())
     return verdict;
   // As from a pipe: nothing is mapped.
-  return read_source([&](Context& ctx) { return open_nrrd(std::make_unique<MemoryStream>(input), ctx); });
+  return read_source([&](Context& ctx) { return open_nrrd(std::make_unique<MemoryStream>(input), {}, ctx); });
 }
 
 Verdict read_nifti(Input input) {
   const std::string path = put(input, is_gzip(input) ? "in.nii.gz" : "in.nii");
-  return read_source([&](Context& ctx) { return open_nifti(path, ctx); });
+  return read_source([&](Context& ctx) { return open_nifti(path, {}, ctx); });
 }
 
 Verdict read_mrc(Input input) {
   const std::string path = put(input, "in.mrc");
-  return read_source([&](Context& ctx) { return open_mrc(path, ctx); });
+  return read_source([&](Context& ctx) { return open_mrc(path, {}, ctx); });
 }
 
 Verdict read_raw(Input input) {
@@ -243,18 +244,18 @@ Verdict read_bunzip2(Input input) {
 
 Verdict read_image(Input input) {
   const std::string path = put(input, fmt::format("in.{}", image_ending(input)));
-  return read_source([&](Context& ctx) { return open_image_stack(path, ctx); });
+  return read_source([&](Context& ctx) { return open_image_stack(path, {}, ctx); });
 }
 
 Verdict read_openvdb(Input input) {
   const std::string path = put(input, "in.vdb");
-  return read_source([&](Context& ctx) { return open_vdb(path, "", ctx); });
+  return read_source([&](Context& ctx) { return open_vdb(path, {}, ctx); });
 }
 
 Verdict read_dicom(Input input) {
   const std::string path = put(input, "dicom/in.dcm");
   return read_source(
-      [&](Context& ctx) { return open_dicom(std::filesystem::path(path).parent_path().string(), ctx); });
+      [&](Context& ctx) { return open_dicom(std::filesystem::path(path).parent_path().string(), {}, ctx); });
 }
 
 /// A mesh, or points.

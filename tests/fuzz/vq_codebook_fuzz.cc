@@ -1,4 +1,5 @@
 // Any bytes as the codebook, and the table of addresses, of a file that is otherwise right.
+#include "formats/volume_chunks.h"
 #include "libvq/layout.h"
 #include "libvq/offsets.h"
 #include "tests/fuzz/vq_target.h"

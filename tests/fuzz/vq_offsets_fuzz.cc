@@ -1,5 +1,6 @@
 // Any bytes as the offset volume of a file that is otherwise right: 16 bricks of 9 x 10 x 40 places or so,
 // both mappings.
+#include "formats/volume_chunks.h"
 #include "libvq/layout.h"
 #include "tests/fuzz/vq_target.h"
 

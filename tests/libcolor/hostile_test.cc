@@ -3,6 +3,7 @@
 
 #include <cstdlib>
 
+#include "formats/volume_chunks.h"
 #include "tests/damage.h"
 #include "tests/libcolor/attack.h"
 #include "tests/libcolor/scenes.h"

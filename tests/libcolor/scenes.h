@@ -85,7 +85,7 @@ class ListSource final : public SurfaceSource {
   ListSource(Voxels voxels, Index3 dims, size_t run = 999) : voxels_(std::move(voxels)), run_(run) {
     info_.dims = dims;
     info_.format = VoxelFormat::rgba32;
-    info_.spacing = {0.5, 0.5, 0.5};
+    info_.affine = Affine::plain({0.5, 0.5, 0.5}, info_.affine.origin);
   }
   Status read(Context&, const Sink& sink) override {
     for (size_t i = 0; i < voxels_.size(); i += run_)

@@ -32,7 +32,7 @@ TEST(VoxelList, OfSeveralVoxelsAtOnePlaceTheLastOneStays) {
   auto surface = surface_of(std::move(scene), f.ctx);
   ASSERT_TRUE(surface);
   EXPECT_EQ((*surface)->info().dims, Index3(7, 3, 1));
-  EXPECT_EQ((*surface)->info().origin, (std::array<double, 3>{-0.5, -1.5, 7.5}));
+  EXPECT_EQ((*surface)->info().affine.origin, (std::array<double, 3>{-0.5, -1.5, 7.5}));
   const Voxels voxels = read(**surface);
   ASSERT_EQ(voxels.size(), 2u);
   EXPECT_EQ(voxels[0].place, morton_code(0, 2, 0));

@@ -153,8 +153,8 @@ TEST_F(VoxeliseTest, TheGridFitsTheMesh) {
   const auto voxels = voxelise(std::move(mesh), {8, SurfaceKind::conservative});
   EXPECT_EQ(info_.dims, Index3(8, 2, 1));
   EXPECT_EQ(info_.format, VoxelFormat::rgba32);
-  for (const double spacing : info_.spacing) EXPECT_EQ(spacing, 0.5);
-  EXPECT_EQ(info_.origin, (std::array<double, 3>{-0.75, 10.25, 0.25}));
+  for (const double spacing : info_.affine.spacing()) EXPECT_EQ(spacing, 0.5);
+  EXPECT_EQ(info_.affine.origin, (std::array<double, 3>{-0.75, 10.25, 0.25}));
   // Its slope is at height 1 after 3.3 voxels: 4 of them above 8.
   EXPECT_EQ(voxels.size(), 12u);
 }
@@ -221,7 +221,7 @@ TEST_F(VoxeliseTest, ClosedSurfacesAreTight) {
       for (size_t i0 = 0; i0 < 4; ++i0)
         add_triangle(mesh, {{corners[i0], corners[(i0 + 1) % 4], corners[(i0 + 2) % 4]}});
       const auto voxels = voxelise(std::move(mesh), {resolution});
-      EXPECT_FALSE(resolution >= 32 && leaks(voxels, glm::ivec3((middle - lo) / info_.spacing[0])))
+      EXPECT_FALSE(resolution >= 32 && leaks(voxels, glm::ivec3((middle - lo) / info_.affine.spacing()[0])))
           << resolution;
     }
   }
@@ -236,7 +236,7 @@ TEST_F(VoxeliseTest, ThinIsThin) {
   add_triangle(mesh, {{b + c, c, b}});
   const double area = 10 * 10 + 2 * 2;  // of the projection along z
   const auto voxels = voxelise(std::move(mesh), {1000});
-  const double voxel = info_.spacing[0] * info_.spacing[1];
+  const double voxel = info_.affine.spacing()[0] * info_.affine.spacing()[1];
   EXPECT_NEAR(static_cast<double>(voxels.size()) * voxel / area, 1, 0.01);
 }
 

@@ -47,7 +47,7 @@ TEST(Camera, RaysGoThroughTheirPixels) {
 TEST(Camera, TransformPutsTheLongestSideFromMinusAHalfToAHalf) {
   VolumeInfo info;
   info.dims = {10, 20, 5};
-  info.spacing = {1, 1, 4};
+  info.affine = Affine::plain({1, 1, 4}, info.affine.origin);
   const GridTransform transform(info);
   EXPECT_NEAR(transform.smallest_edge(), 1.0 / 20, 1e-12);
   EXPECT_NEAR(transform.largest_edge(), 4.0 / 20, 1e-12);

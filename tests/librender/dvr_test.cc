@@ -154,7 +154,7 @@ class Stretched final : public VolumeSource {
   Stretched(std::unique_ptr<VolumeSource> source, std::array<double, 3> spacing)
       : source_(std::move(source)) {
     info_ = source_->info();
-    info_.spacing = spacing;
+    info_.affine = Affine::plain(spacing, info_.affine.origin);
   }
   Status read(const Box& box, VoxelSpan out) override { return source_->read(box, out); }
 
@@ -348,7 +348,7 @@ TEST(Dvr, ColoursAndTooManySamplesAreRefused) {
   ASSERT_FALSE(refused);
   EXPECT_EQ(refused.error().code, ErrorCode::input);
   auto needle = voxkit::test::scalar_info({2, 2, 65536}, SampleType::u8);
-  needle.spacing = {0.01, 1, 1};
+  needle.affine = Affine::plain({0.01, 1, 1}, needle.affine.origin);
   voxkit::test::MemorySource thin(needle, std::vector<std::byte>(4 * 65536));
   DvrFrame frame;
   const Status status =

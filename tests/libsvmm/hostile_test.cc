@@ -5,6 +5,7 @@
 #include <cstdlib>
 #include <functional>
 
+#include "formats/volume_chunks.h"
 #include "libsvmm/layout.h"
 #include "tests/damage.h"
 #include "tests/libsvmm/attack.h"

@@ -1,6 +1,7 @@
 // Damaged and invented VQ files: whatever the bytes, an error or a well-formed answer.
 #include <cstdlib>
 
+#include "formats/volume_chunks.h"
 #include "libvq/layout.h"
 #include "tests/damage.h"
 #include "tests/libvq/attack.h"

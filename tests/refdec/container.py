@@ -80,7 +80,7 @@ def unzstd(frame, length):
 # ---- Section 1: the container ----------------------------------------------------------------------------------------
 
 Chunk = namedtuple("Chunk", "kind index part offset length checksum")
-KINDS = (b"VOLI", b"SVMP", b"BLKS", b"VQPM", b"OFFS", b"ADDR", b"CODE", b"DAGP", b"LEAF", b"NODE",
+KINDS = (b"VOLI", b"VOLX", b"SVMP", b"BLKS", b"VQPM", b"OFFS", b"ADDR", b"CODE", b"DAGP", b"LEAF", b"NODE",
          b"COLR", b"PALT")  # any other kind is ignored
 
 
@@ -94,7 +94,7 @@ class Container:
         require(size >= 128, "file: {} bytes, shorter than a header and a trailer", size)
         self.check("header", 0, 56, self.unpack("<Q", 56)[0])
         self.version, self.codec = self.unpack("<HH", 8)
-        require(1 <= self.version <= 2, "header: byte 8: container version {}, expected 1 or 2", self.version)
+        require(1 <= self.version <= 3, "header: byte 8: container version {}, expected 1 to 3", self.version)
 
         end = size - 64
         require(data[end:end + 8] == b"VOXTABLE", "trailer: byte {}: not found, the file is truncated", end)
@@ -116,7 +116,7 @@ class Container:
                 require(chunk[:3] not in self.chunks, "chunk table: byte {}: chunk listed twice", at)
                 self.check("chunk " + chunk.kind.decode(), chunk.offset, chunk.length, chunk.checksum)
                 content = self.unpack("<Q", at + 40)[0]
-                if self.version == 2 and content != 0:
+                if self.version >= 2 and content != 0:
                     require(chunk.length < content < chunk.length << 15, "chunk table: byte {}: {} bytes in {}", at + 40,
                             content, chunk.length)
                     stored = bytes(self.data[chunk.offset:free])
@@ -146,9 +146,11 @@ class Container:
 
 FORMATS = {1: ("RGBA32", 4), 2: ("RGB24", 3), 3: ("DENSITY8", 1), 4: ("DENSITY16", 2), 5: ("FLOAT32", 4),
            6: ("BITMAP", 1)}
-SAMPLES = {1: "u8", 2: "i8", 3: "u16", 4: "i16", 5: "u32", 6: "i32", 7: "u64", 8: "i64", 9: "f32", 10: "f64", 11: "bit"}
+SAMPLES = {1: "u8", 2: "i8", 3: "u16", 4: "i16", 5: "u32", 6: "i32", 7: "u64", 8: "i64", 9: "f32", 10: "f64", 11: "bit",
+           12: "f16"}
 SAMPLES_OF = {"DENSITY8": ("u8", "i8"), "DENSITY16": ("u16", "i16"), "BITMAP": ("bit",),
               "FLOAT32": ("u32", "i32", "u64", "i64", "f32", "f64")}
+WIDE = {"u32": (0, 2**32), "i32": (-2**31, 2**31), "u64": (-2**63, 2**63), "i64": (-2**63, 2**63)}
 
 
 class Volume:
@@ -164,10 +166,41 @@ class Volume:
         self.format, self.voxel_bytes = FORMATS[voxel]
         self.colour = voxel <= 2
         self.sample = SAMPLES.get(sample)
-        require(self.sample in SAMPLES_OF.get(self.format, SAMPLES.values()),
+        more = container.version == 3 and any(kind == b"VOLX" for kind, _, _ in container.chunks)
+        allowed = SAMPLES_OF.get(self.format, tuple(SAMPLES.values())[:11])
+        if more and not self.colour:
+            allowed += {"FLOAT32": ("f16",), "DENSITY8": tuple(WIDE), "DENSITY16": tuple(WIDE)}.get(self.format, ())
+        require(self.sample in allowed,
                 "chunk VOLI: byte {}: sample type {} does not go with {}", at + 25, sample, self.format)
         require(self.has_range <= 1, "chunk VOLI: byte {}: {}, expected 0 or 1", at + 26, self.has_range)
         self.spacing, self.origin = container.unpack("<3d", at + 32), container.unpack("<3d", at + 56)
         require(all(map(math.isfinite, self.spacing + self.origin)),
                 "chunk VOLI: byte {}: spacing or origin not finite", at + 32)
         self.slope, self.intercept, *self.range = container.unpack("<4d", at + 80)
+        self.axes = [[self.spacing[a] if a == b else 0.0 for b in range(3)] for a in range(3)]
+        self.world = self.unit = self.base = 0
+        self.labels, self.description = None, ""
+        if more:
+            self.read_more(container)
+
+    def read_more(self, container):
+        """Section 1.5: the chunk VOLX."""
+        chunk = container.only(b"VOLX")
+        at = chunk.offset
+        require(chunk.length >= 136, "chunk VOLX: byte {}: {} bytes, expected 136 or more", at, chunk.length)
+        self.world, self.unit, _, flags, text, count = container.unpack("<4BIQ", at)
+        require(self.world <= 6 and self.unit <= 7 and flags < 16, "chunk VOLX: byte {}: unknown world, unit or flag", at)
+        require(text <= 4096 and count <= 65536 and (count > 0) == bool(flags & 4) and
+                chunk.length == 136 + 8 * count + text, "chunk VOLX: byte {}: lengths do not add up", at + 4)
+        numbers = container.unpack("<12d", at + 16)
+        self.axes, self.origin = [list(numbers[3 * a:3 * a + 3]) for a in range(3)], numbers[9:]
+        a, b, c = self.axes
+        volume = sum(a[i] * (b[i - 2] * c[i - 1] - b[i - 1] * c[i - 2]) for i in range(3))
+        require(all(map(math.isfinite, numbers)) and volume != 0, "chunk VOLX: byte {}: no axes of a volume", at + 16)
+        self.base, = container.unpack("<q", at + 120)
+        if count:
+            require(self.format in ("DENSITY8", "DENSITY16"), "chunk VOLX: byte {}: labels of {}", at + 8, self.format)
+            self.labels = container.unpack(f"<{count}q", at + 136)
+            least, end = WIDE.get(self.sample, (-2**63, 2**63))
+            require(all(least <= label < end for label in self.labels), "chunk VOLX: byte {}: no {}", at + 136, self.sample)
+        self.description = bytes(container.data[at + 136 + 8 * count:at + chunk.length]).decode("utf-8", "replace")

@@ -21,7 +21,7 @@ Result<std::unique_ptr<VolumeSource>> Inputs::open(bool wanted_again) {
     VOX_TRY(auto stream, open_stream("-"));
     VOX_TRY(spooled_, MappedFile::spool(*stream));
   }
-  VOX_TRY(Input input, open_spooled(spooled_, ctx_));
+  VOX_TRY(Input input, open_spooled(spooled_, open_, ctx_));
   return std::move(input.source);
 }
 

@@ -1,7 +1,9 @@
 #include "tools/common/input.h"
 
 #include <array>
+#include <cmath>
 #include <filesystem>
+#include <limits>
 #include <system_error>
 #include <utility>
 
@@ -15,6 +17,8 @@ namespace voxkit::cli {
 namespace {
 
 namespace fs = std::filesystem;
+
+constexpr int64_t most_parts = int64_t{1} << 40;  // a number of a time step or a channel is below it
 
 Result<std::shared_ptr<const Container>> container_of(std::shared_ptr<const MappedFile> file, Context& ctx) {
   const auto bytes = file->bytes();
@@ -74,14 +78,42 @@ Result<Peeked> peek_standard_input() {
 void declare_input_options(CommandLine& line, OpenOptions& options, bool type) {
   line.option("--dims", "X,Y,Z", "Extent of a .raw input", dims(options.dims));
   if (type) {
-    line.option("--type", "TYPE", "Type of a .raw input: u8 i8 u16 i16 u32 i32 f32 f64 rgb8 rgba8 bit",
-                one_of({"u8", "i8", "u16", "i16", "u32", "i32", "f32", "f64", "rgb8", "rgba8", "bit"},
+    line.option("--type", "TYPE",
+                "Type of a .raw input: u8 i8 u16 i16 u32 i32 u64 i64 f16 f32 f64 rgb8 rgba8 bit",
+                one_of({"u8", "i8", "u16", "i16", "u32", "i32", "u64", "i64", "f16", "f32", "f64", "rgb8",
+                        "rgba8", "bit"},
                        [&options](const std::string& word) { options.type = word; }));
   }
   line.option(
       "--endian", "big|little", "Byte order of a .raw input",
       one_of({"big", "little"}, [&options](const std::string& word) { options.big_endian = word == "big"; }));
-  line.text("--grid", "NAME", "Grid of a .vdb input", options.grid);
+  line.text("--grid", "NAME", "Of an input with several grids, such as a .vdb file: which one", options.grid);
+  line.option("--time", "N", "Of an input with several time steps: which one, from 0",
+              integer(options.time, 0, most_parts));
+  line.option("--channel", "N", "Of an input with several channels: which one, from 0",
+              integer(options.channel, 0, most_parts));
+  line.text("--series", "ID",
+            "Of a folder with several DICOM series: the number or the end of the UID of one", options.series);
+  line.flag("--labels", "The values of the input are names of things: they have no averages", options.labels);
+  line.option("--fill", "V", "The value of the input that stands for nothing measured",
+              [&options](const std::string& text) -> Status {
+                if (text == "nan" || text == "NaN") {
+                  options.fill = std::nan("");
+                  return {};
+                }
+                VOX_TRY(options.fill, read_number(text, std::numeric_limits<double>::lowest(),
+                                                  std::numeric_limits<double>::max()));
+                return {};
+              });
+  line.option("--gaps", "KIND",
+              "Slices that are missing or unevenly far apart: refuse, accept or fill them (refuse)",
+              one_of({"refuse", "accept", "fill"}, [&options](const std::string& word) {
+                options.gaps = word == "accept" ? OpenOptions::Gaps::accept
+                               : word == "fill" ? OpenOptions::Gaps::fill
+                                                : OpenOptions::Gaps::refuse;
+              }));
+  line.flag("--allow-outside", "A header may name data files outside of its own folder",
+            options.allow_outside);
 }
 
 bool is_compressed(const std::string& name) {
@@ -103,13 +135,13 @@ Result<Input> open_compressed(const std::string& name, int level, Context& ctx) 
   return open_codec(std::move(container), level, ctx);
 }
 
-Result<Input> open_spooled(std::shared_ptr<const MappedFile> file, Context& ctx) {
+Result<Input> open_spooled(std::shared_ptr<const MappedFile> file, const OpenOptions& options, Context& ctx) {
   if (is_container(file->bytes())) {
     VOX_TRY(auto container, container_of(std::move(file), ctx));
     return open_codec(std::move(container), 0, ctx);
   }
   Input input;
-  VOX_TRY(input.source, open_nrrd(stream_of(std::move(file)), ctx));
+  VOX_TRY(input.source, open_nrrd(stream_of(std::move(file)), options, ctx));
   return input;
 }
 
@@ -125,11 +157,11 @@ Result<Input> open_input(const std::string& name, const OpenOptions& options, Co
   }
   VOX_TRY(Peeked peeked, peek_standard_input());
   if (!peeked.container) {
-    VOX_TRY(input.source, open_nrrd(std::move(peeked.stream), ctx));
+    VOX_TRY(input.source, open_nrrd(std::move(peeked.stream), options, ctx));
     return input;
   }
   VOX_TRY(auto file, MappedFile::spool(*peeked.stream));
-  return open_spooled(std::move(file), ctx);
+  return open_spooled(std::move(file), options, ctx);
 }
 
 std::optional<uint64_t> file_bytes(const std::string& name) {

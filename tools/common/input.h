@@ -21,13 +21,13 @@ struct Input {
   std::shared_ptr<const color::Volume> color;  ///< null for all but .dagc
 };
 
-/// Declares --dims, --endian and --grid, and with `type` also --type as the type of a .raw input.
+/// Declares --dims, --endian, --grid and what else OpenOptions has, and with `type` also --type as the type of a .raw input.
 void declare_input_options(CommandLine& line, OpenOptions& options, bool type = true);
 
 /// Opens a file, a built-in, or standard input ("-": a container or NRRD, told apart by its first bytes).
 Result<Input> open_input(const std::string& name, const OpenOptions& options, Context& ctx);
 /// Opens what standard input held: a container or NRRD. It can be opened any number of times.
-Result<Input> open_spooled(std::shared_ptr<const MappedFile> file, Context& ctx);
+Result<Input> open_spooled(std::shared_ptr<const MappedFile> file, const OpenOptions& options, Context& ctx);
 /// Opens a compressed volume only. `level`: of the mip-map, as the voxels of the source.
 Result<Input> open_compressed(const std::string& name, int level, Context& ctx);
 /// The container in a file or on standard input.

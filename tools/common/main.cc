@@ -78,6 +78,12 @@ void Run::detail(const std::string& text) {
   if (progress_) progress_->detail(text);
 }
 
+void Run::say(const std::string& line) {
+  if (options.quiet) return;
+  std::lock_guard lock(said_mutex_);
+  if (said_.insert(line).second) report(tool, {ErrorCode::input, {}, line});
+}
+
 void Run::note(const std::string& line) const {
   if (options.verbose) fmt::print(stderr, "{}: {}\n", tool, line);
 }

@@ -4,6 +4,8 @@
 #include <cstdint>
 #include <functional>
 #include <memory>
+#include <mutex>
+#include <set>
 #include <string>
 
 #include "formats/clock.h"
@@ -20,6 +22,7 @@ class Run {
       : tool(std::move(tool_name)), options(common), memory_(common.max_memory) {
     ctx.threads = common.threads;
     ctx.memory = &memory_;
+    ctx.note = [this](const std::string& line) { say(line); };
   }
 
   std::string tool;
@@ -30,6 +33,9 @@ class Run {
   void stage(const std::string& name);
   /// Adds to the progress display of this stage: words such as "iteration=3".
   void detail(const std::string& text);
+  /// A line on standard error unless --quiet is given: what of an input is dropped, assumed or found. Each
+  /// once.
+  void say(const std::string& line);
   /// A line on standard error, with --verbose only.
   void note(const std::string& line) const;
   /// Seconds since the tool started.
@@ -37,6 +43,8 @@ class Run {
 
  private:
   MemoryBudget memory_;
+  std::mutex said_mutex_;
+  std::set<std::string> said_;
   std::unique_ptr<Progress> progress_;
   Clock::time_point start_ = Clock::now();
 };

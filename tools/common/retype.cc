@@ -15,7 +15,7 @@ Result<std::unique_ptr<VolumeSource>> retyped(std::unique_ptr<VolumeSource> sour
   ValueRange stored;
   if (needs_range(info, *type)) {
     if (range) {
-      stored = {range->lo + info.bias(), range->hi + info.bias()};
+      stored = {info.stored(range->lo), info.stored(range->hi)};
     } else if (source->forward_only() && !open_again) {
       if (!info.range)
         return bad_usage(

@@ -29,9 +29,10 @@ Status write_points(const color::Volume& volume, const std::string& name, bool f
         points.clear();
         for (const color::SurfaceVoxel& voxel : voxels) {
           const auto at = place_of(voxel);
+          const Affine::Vector place = info.affine.place(
+              {static_cast<double>(at[0]), static_cast<double>(at[1]), static_cast<double>(at[2])});
           ColoredPoint& point = points.emplace_back();
-          for (size_t a = 0; a < 3; ++a)
-            point.at[a] = static_cast<float>(info.origin[a] + info.spacing[a] * at[a]);
+          for (size_t a = 0; a < 3; ++a) point.at[a] = static_cast<float>(place[a]);
           point.color = {voxel.color.r, voxel.color.g, voxel.color.b};
         }
         return writer.add(points);
