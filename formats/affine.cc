@@ -117,13 +117,14 @@ bool Affine::is_valid() const {
     return std::all_of(v.begin(), v.end(), [](double x) { return std::isfinite(x); });
   };
   if (!std::all_of(axes.begin(), axes.end(), finite) || !finite(origin)) return false;
+  // Of axes brought to length 1: products of short ones may be too small for a double.
   const Vector lengths = spacing();
-  double scaled = determinant();
-  for (const double length : lengths) {
-    if (!(length > 0) || !std::isfinite(length)) return false;
-    scaled /= length;  // one at a time: the product may be too small for a double
+  Affine unit = *this;
+  for (size_t a = 0; a < 3; ++a) {
+    if (!(lengths[a] > 0) || !std::isfinite(lengths[a])) return false;
+    for (double& x : unit.axes[a]) x /= lengths[a];
   }
-  return std::isfinite(scaled) && std::abs(scaled) > 1e-9;
+  return std::abs(unit.determinant()) > 1e-9;
 }
 
 Affine::Vector Affine::place(const Vector& index) const {

@@ -17,9 +17,9 @@ Result<std::unique_ptr<VolumeSource>> crop(std::unique_ptr<VolumeSource> source,
 
 /// The volume at another size (each side 1..2^20), independently along each axis: linear between voxel
 /// centres where there are more voxels than before, the average over each voxel's extent where there are
-/// fewer. Integers are averaged exactly and rounded half up; colours of RGBA32 are weighted by alpha. Spacing
-/// and origin follow. Not for forward-only sources (ErrorCode::usage), nor for voxels that cover more than
-/// 2^24 of the source's.
+/// fewer. Labels are those of the nearest voxel. Integers are averaged exactly and rounded half up; colours
+/// of RGBA32 are weighted by alpha. Spacing and origin follow. Not for forward-only sources
+/// (ErrorCode::usage), nor for voxels that cover more than 2^24 of the source's.
 Result<std::unique_ptr<VolumeSource>> resample(std::unique_ptr<VolumeSource> source, Index3 dims);
 
 /// What voxels are converted to.

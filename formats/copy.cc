@@ -4,6 +4,7 @@
 #include <bit>
 #include <cmath>
 #include <limits>
+#include <mutex>
 #include <new>
 #include <thread>
 #include <vector>
@@ -36,6 +37,20 @@ struct Extremes {
     hi = std::max(hi, e.hi);
   }
 
+  /// Without voxels of the value `fill`.
+  template <class T>
+  void add(ConstVoxelSpan voxels, Index3 size, const std::optional<double>& fill) {
+    if (!fill) return add<T>(voxels, size);
+    for (int64_t z = 0; z < size.z; ++z)
+      for (int64_t y = 0; y < size.y; ++y)
+        for (int64_t x = 0; x < size.x; ++x) {
+          T value;
+          std::memcpy(&value, voxels.row(y, z) + x * static_cast<int64_t>(sizeof(T)), sizeof(T));
+          if constexpr (std::is_floating_point_v<T>)
+            if (!std::isfinite(value)) continue;
+          if (const auto v = static_cast<double>(value); v != *fill) merge({v, v});
+        }
+  }
   template <class T>
   void add(ConstVoxelSpan voxels, Index3 size) {
     for (int64_t z = 0; z < size.z; ++z)
@@ -54,14 +69,14 @@ struct Extremes {
       }
   }
 
-  void add(ConstVoxelSpan voxels, Index3 size, VoxelFormat format) {
+  void add(ConstVoxelSpan voxels, Index3 size, VoxelFormat format, const std::optional<double>& fill) {
     switch (format) {
       case VoxelFormat::density16:
-        return add<uint16_t>(voxels, size);
+        return add<uint16_t>(voxels, size, fill);
       case VoxelFormat::float32:
-        return add<float>(voxels, size);
+        return add<float>(voxels, size, fill);
       default:
-        return add<uint8_t>(voxels, size);
+        return add<uint8_t>(voxels, size, fill);
     }
   }
 };
@@ -217,57 +232,73 @@ Status copy_volume(VolumeSource& source, const Box& box, VolumeSink& sink, Conte
   return {};
 }
 
-Result<ValueRange> measure_range(VolumeSource& source, Context& ctx) {
+Status visit_voxels(VolumeSource& source, const std::function<void(ConstVoxelSpan, Index3)>& visit,
+                    Context& ctx) {
   const VoxelFormat format = source.info().format;
-  if (is_colour(format)) return bad_usage("a colour volume has no range of values: expected a scalar volume");
   const Box box = source.info().box();
   const Slabs slabs(box, voxel_bytes(format), slab_target(ctx));
   std::unique_ptr<Buffer> buffer;
   if (source.forward_only()) {
     VOX_TRY(buffer, Buffer::allocate(slabs.bytes(), "a slab of voxels", ctx));
   }
-
-  Extremes total;
+  const auto visit_one = [&](const Voxel& value) {
+    visit(packed(value.bytes.data(), Index3(1), format), Index3(1));
+  };
   for (int64_t i = 0; i < slabs.count(); ++i) {
+    VOX_CHECK(check_interrupt());
     const Box slab = slabs.slab(i);
     VoxelSpan whole;
     if (buffer) {
       whole = packed(buffer->data(), slab.size(), format);
       VOX_CHECK(source.read(slab, whole));
     } else if (const auto value = source.uniform(slab)) {
-      total.add(packed(value->bytes.data(), Index3(1), format), Index3(1), format);
+      visit_one(*value);
       continue;
     }
     source.expect(slab.lo.z, slab.hi.z);
-    std::vector<Extremes> parts(static_cast<size_t>(Slabs::tiles(slab)));
-    const Status status = parallel_for(ctx, Slabs::tiles(slab), [&](int64_t t) -> Status {
+    VOX_CHECK(parallel_for(ctx, Slabs::tiles(slab), [&](int64_t t) -> Status {
       const Box tile = Slabs::tile(slab, t);
-      Extremes& part = parts[static_cast<size_t>(t)];
       if (buffer) {
         const Index3 at = tile.lo - slab.lo;
-        part.add({whole.row(at.y, at.z) + at.x * voxel_bytes(format), whole.row_stride, whole.slice_stride},
-                 tile.size(), format);
+        visit({whole.row(at.y, at.z) + at.x * voxel_bytes(format), whole.row_stride, whole.slice_stride},
+              tile.size());
         return {};
       }
       const auto known = [&](const Box& b) {
         const auto value = source.uniform(b);
-        if (value) part.add(packed(value->bytes.data(), Index3(1), format), Index3(1), format);
+        if (value) visit_one(*value);
         return value.has_value();
       };
       std::unique_ptr<std::byte[]> voxels;
       const auto read = [&](const Box& b) -> Status {
         if (!voxels) voxels.reset(new std::byte[static_cast<size_t>(tile.voxels() * voxel_bytes(format))]);
         VOX_CHECK(source.read(b, packed(voxels.get(), b.size(), format)));
-        part.add(packed(static_cast<const std::byte*>(voxels.get()), b.size(), format), b.size(), format);
+        visit(packed(static_cast<const std::byte*>(voxels.get()), b.size(), format), b.size());
         return {};
       };
       return walk_tile(tile, known, read);
-    });
-    VOX_CHECK(status);
-    for (const Extremes& part : parts) total.merge(part);
+    }));
     source.release(slab.lo.z, slab.hi.z);
     ctx.progress(static_cast<double>(slab.hi.z) / static_cast<double>(box.hi.z));
   }
+  return {};
+}
+
+Result<ValueRange> measure_range(VolumeSource& source, Context& ctx) {
+  const VolumeInfo& info = source.info();
+  const VoxelFormat format = info.format;
+  if (is_colour(format)) return bad_usage("a colour volume has no range of values: expected a scalar volume");
+  Extremes total;
+  std::mutex mutex;
+  VOX_CHECK(visit_voxels(
+      source,
+      [&](ConstVoxelSpan voxels, Index3 size) {
+        Extremes part;
+        part.add(voxels, size, format, info.fill);
+        std::lock_guard lock(mutex);
+        total.merge(part);
+      },
+      ctx));
   if (total.lo > total.hi) return ValueRange{0, 0};
   return ValueRange{total.lo, total.hi};
 }

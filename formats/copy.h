@@ -68,8 +68,13 @@ Status read_slab(VolumeSource& source, const Box& slab, VoxelSpan out, Context& 
 /// forward-only.
 Status copy_volume(VolumeSource& source, const Box& box, VolumeSink& sink, Context& ctx);
 
-/// The least and greatest stored value of a scalar volume; NaN and infinities are not counted, and a volume
-/// of nothing else has the range 0..0. A forward-only source is used up.
+/// Calls `visit` with all voxels, in parts of any shape, from any of ctx.threads threads; of a part that is
+/// known to have one value, with one voxel. A forward-only source is used up.
+Status visit_voxels(VolumeSource& source,
+                    const std::function<void(ConstVoxelSpan voxels, Index3 size)>& visit, Context& ctx);
+
+/// The least and greatest stored value of a scalar volume; its fill value, NaN and infinities are not
+/// counted, and a volume of nothing else has the range 0..0. A forward-only source is used up.
 Result<ValueRange> measure_range(VolumeSource& source, Context& ctx);
 
 }  // namespace voxkit

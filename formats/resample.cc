@@ -169,6 +169,46 @@ class ResampledSource : public VolumeSource {
   Axis axes_[3];
 };
 
+/// Labels have no averages: each voxel is the source's voxel that its centre lies in.
+class NearestSource final : public VolumeSource {
+ public:
+  NearestSource(std::unique_ptr<VolumeSource> source, Index3 dims)
+      : source_(std::move(source)), old_(source_->info().dims) {
+    info_ = source_->info();
+    Affine::Vector factors;
+    for (int a = 0; a < 3; ++a)
+      factors[static_cast<size_t>(a)] = static_cast<double>(old_[a]) / static_cast<double>(dims[a]);
+    info_.affine = info_.affine.coarser(factors);
+    info_.dims = dims;
+  }
+  Status read(const Box& box, VoxelSpan out) override {
+    const Index3 size = box.size(), first = nearest(box.lo), last = nearest(box.hi - Index3(1));
+    const int64_t bytes = voxel_bytes(info_.format);
+    const Index3 row{last.x - first.x + 1, 1, 1};
+    std::vector<std::byte> voxels(static_cast<size_t>(row.x * bytes));
+    for (int64_t z = 0; z < size.z; ++z)
+      for (int64_t y = 0; y < size.y; ++y) {
+        const Index3 at = nearest(box.lo + Index3(0, y, z));
+        VOX_CHECK(source_->read({{first.x, at.y, at.z}, {last.x + 1, at.y + 1, at.z + 1}},
+                                packed(voxels.data(), row, info_.format)));
+        for (int64_t x = 0; x < size.x; ++x)
+          std::memcpy(out.row(y, z) + x * bytes,
+                      &voxels[static_cast<size_t>((nearest(box.lo + Index3(x, 0, 0)).x - first.x) * bytes)],
+                      static_cast<size_t>(bytes));
+      }
+    return {};
+  }
+
+ private:
+  Index3 nearest(Index3 voxel) const {
+    Index3 at;
+    for (int a = 0; a < 3; ++a) at[a] = (2 * voxel[a] + 1) * old_[a] / (2 * info_.dims[a]);
+    return at;
+  }
+  std::unique_ptr<VolumeSource> source_;
+  Index3 old_;
+};
+
 }  // namespace
 
 Result<std::unique_ptr<VolumeSource>> resample(std::unique_ptr<VolumeSource> source, Index3 dims) {
@@ -188,6 +228,10 @@ Result<std::unique_ptr<VolumeSource>> resample(std::unique_ptr<VolumeSource> sou
     return bad_usage(
         fmt::format("one voxel would cover {} voxels: expected at most {}: resample in two steps", per_voxel,
                     largest_reduction));
+  if (source->info().is_labels) return std::make_unique<NearestSource>(std::move(source), dims);
+  if (source->info().fill && source->info().format != VoxelFormat::float32)
+    return bad_usage(
+        "averages of integers do not leave out a fill value: convert them with --output-type f32 first");
   return std::make_unique<ResampledSource>(std::move(source), dims);
 }
 

@@ -115,6 +115,8 @@ class Encoder {
         levels_(plan_levels(info_, params)),
         reservation_(*ctx.memory) {
     if (levels_.size() == 1) params_.base = Base::raw;
+    if (info_.fill && F != VoxelFormat::float32 && !is_colour(F))
+      criterion_.fill = static_cast<int64_t>(*info_.fill);
     for (uint32_t k = 0; k < levels_.size(); ++k) writers_.emplace_back(container_, k, levels_[k]);
   }
 
@@ -401,7 +403,7 @@ class Encoder {
   VolumeSource& source_;
   const VolumeInfo info_;
   Params params_;
-  const Criterion criterion_;
+  Criterion criterion_;
   Context& ctx_;
   ContainerWriter container_;
   std::vector<Level> levels_;

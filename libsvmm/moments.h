@@ -31,6 +31,9 @@ struct Criterion {
   int64_t scalar;   ///< itself, rounded down (integer scalars)
   Layout layout;
   bool alpha_weight, global;
+  /// Integer scalars: the stored value that stands for nothing measured; -1: none. It has no part in
+  /// averages, and is near to itself only.
+  int64_t fill = -1;
 };
 
 /// Rounded to nearest, halves up.
@@ -140,9 +143,15 @@ requires(F == VoxelFormat::density8 || F == VoxelFormat::density16 ||
   using Value = std::conditional_t<F == VoxelFormat::density16, uint16_t, uint8_t>;
   uint64_t count = 0, sum = 0;
   Value lo = static_cast<Value>(-1), hi = 0;
+  uint64_t fills = 0;  ///< voxels of the fill value, which are counted here only
 
   static Value load(const std::byte* v) { return load_le<Value>(v); }
-  void add(const std::byte* v, int64_t n, const Criterion&) {
+  void add(const std::byte* v, int64_t n, const Criterion& criterion) {
+    if (criterion.fill >= 0) {
+      for (int64_t i = 0; i < n; ++i)
+        add_uniform(Voxel::of(load(v + i * static_cast<int64_t>(sizeof(Value)))), 1, criterion);
+      return;
+    }
     count += static_cast<uint64_t>(n);
     for (int64_t end = 0; n > 0; n -= end, v += end * static_cast<int64_t>(sizeof(Value))) {
       end = std::min<int64_t>(n, 1 << 15);  // as many as 32 bits can sum up
@@ -164,22 +173,29 @@ requires(F == VoxelFormat::density8 || F == VoxelFormat::density16 ||
     sum += m.sum;
     lo = std::min(lo, m.lo);
     hi = std::max(hi, m.hi);
+    fills += m.fills;
   }
-  void add_uniform(const Voxel& v, uint64_t n, const Criterion&) {
+  void add_uniform(const Voxel& v, uint64_t n, const Criterion& criterion) {
     const Value x = load(v.bytes.data());
-    add(Moments{n, x * n, x, x});
+    if (x == criterion.fill)
+      fills += n;
+    else
+      add(Moments{n, x * n, x, x, 0});
   }
-  bool uniform() const { return lo == hi; }
-  Voxel value(const Criterion&) const {
+  bool uniform() const { return fills == 0 ? lo == hi : count == 0; }
+  Voxel value(const Criterion& criterion) const {
+    if (count == 0) return Voxel::of(static_cast<Value>(std::max<int64_t>(criterion.fill, 0)));
     return Voxel::of(static_cast<Value>(rounded_quotient(F == VoxelFormat::bitmap ? sum * 255 : sum, count)));
   }
   bool within(const Voxel& v, const Criterion& criterion) const {
+    if (fills > 0) return count == 0;
     const int64_t a = decoded_value(v, F).template as<Value>();
-    return std::max(a - lo, hi - a) <= criterion.scalar;
+    return a != criterion.fill && std::max(a - lo, hi - a) <= criterion.scalar;
   }
   static bool near(const std::byte* voxel, const Voxel& v, const Criterion& criterion) {
-    return std::abs(int64_t{load(voxel)} - int64_t{decoded_value(v, F).template as<Value>()}) <=
-           criterion.scalar;
+    const int64_t x = load(voxel), a = decoded_value(v, F).template as<Value>();
+    if (criterion.fill >= 0 && (x == criterion.fill || a == criterion.fill)) return x == a;
+    return std::abs(x - a) <= criterion.scalar;
   }
 };
 

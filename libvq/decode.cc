@@ -3,6 +3,7 @@
 
 #include <algorithm>
 #include <cstring>
+#include <limits>
 #include <type_traits>
 
 #include "formats/volume_chunks.h"
@@ -34,8 +35,12 @@ const View& Volume::view() const {
 Index3 Volume::bricks() const {
   return bricks_of(info_.dims);
 }
+Voxel Volume::no_value() const {
+  if (info_.format == VoxelFormat::float32) return Voxel::of(std::numeric_limits<float>::quiet_NaN());
+  return vq::voxel_of(0, info_.format, info_.fill.value_or(0), 1);
+}
 Voxel Volume::voxel_of(uint16_t code) const {
-  return vq::voxel_of(code, info_.format, params_.base, params_.step);
+  return params_.special == code ? no_value() : vq::voxel_of(code, info_.format, params_.base, params_.step);
 }
 
 /// A reader whose failures have reasons.
@@ -134,6 +139,8 @@ Result<uint64_t> decode_box(const Decoder& decoder, const Box& box, int32_t most
   std::array<T, brick_voxels> voxels;
   std::array<T, brick_voxels * run_bricks> rows;  // 16 of run_bricks * 4 voxels
   uint64_t decoded = no_id, count = 0;
+  T no_value;
+  std::memcpy(&no_value, decoder.volume.no_value().bytes.data(), sizeof no_value);
   for (int64_t z = first.z; z <= last.z; ++z)
     for (int64_t y = first.y; y <= last.y; ++y)
       for (int64_t begin = first.x; begin <= last.x; begin += run_bricks) {
@@ -146,6 +153,9 @@ Result<uint64_t> decode_box(const Decoder& decoder, const Box& box, int32_t most
             if (!decoder.reader.find(id, record) || !decoder.reader.decode(record, codes.data()))
               return decoder.no_brick(id);
             to_voxels(codes, params, most, voxels);
+            if (params.special)
+              for (size_t i = 0; i < codes.size(); ++i)
+                if (codes[i] == *params.special) voxels[i] = no_value;
             decoded = id;
           }
           T* const to = &rows[static_cast<size_t>((x - begin) * brick_edge)];

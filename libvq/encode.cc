@@ -59,8 +59,11 @@ class Writer {
       hi = std::max(hi, range.max);
     }
     least_ = lo;
+    p.special = quantiser_.special();
     p.bits = std::max(1, static_cast<int>(std::bit_width(static_cast<unsigned>(hi - lo))));
     p.base = quantiser_.origin() + quantiser_.step() * lo;
+    if (p.special) p.special = static_cast<uint16_t>(*p.special - lo);
+    if (p.special && *p.special > hi - lo) p.special.reset();  // there is none
     p.step = quantiser_.step();
     std::vector<uint64_t> counts(codes_.size());
     for (const uint32_t n : numbers_)
@@ -218,6 +221,9 @@ Status validate(const Options& options, const VolumeInfo& info) {
     return bad_usage(fmt::format("--max-error {}: expected a number of at least 0", *options.max_error));
   if ((options.codewords > 0) + (options.reduce > 0) + options.max_error.has_value() > 1)
     return bad_usage("--codewords, --reduce and --max-error: expected one of them");
+  if ((options.keep_nan || info.fill) && (options.codewords > 0 || options.reduce > 0))
+    return bad_usage(
+        "--codewords and --reduce: bricks with a fill value have no average: expected --max-error");
   return {};
 }
 

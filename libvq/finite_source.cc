@@ -8,8 +8,11 @@ namespace {
 
 class FiniteSource : public VolumeSource {
  public:
-  FiniteSource(VolumeSource& source, const ValueRange& range)
-      : source_(source), lo_(static_cast<float>(range.lo)), hi_(static_cast<float>(range.hi)) {
+  FiniteSource(VolumeSource& source, const ValueRange& range, bool keep_nan)
+      : source_(source),
+        lo_(static_cast<float>(range.lo)),
+        hi_(static_cast<float>(range.hi)),
+        keep_nan_(keep_nan) {
     info_ = source.info();
   }
   bool forward_only() const override { return source_.forward_only(); }
@@ -32,16 +35,19 @@ class FiniteSource : public VolumeSource {
   void release(int64_t z0, int64_t z1) const override { source_.release(z0, z1); }
 
  private:
-  float finite(float v) const { return std::isfinite(v) ? v : v > 0 ? hi_ : lo_; }
+  float finite(float v) const {
+    return std::isfinite(v) || (keep_nan_ && std::isnan(v)) ? v : v > 0 ? hi_ : lo_;
+  }
 
   VolumeSource& source_;
   float lo_, hi_;
+  bool keep_nan_;
 };
 
 }  // namespace
 
-std::unique_ptr<VolumeSource> finite_source(VolumeSource& source, const ValueRange& range) {
-  return std::make_unique<FiniteSource>(source, range);
+std::unique_ptr<VolumeSource> finite_source(VolumeSource& source, const ValueRange& range, bool keep_nan) {
+  return std::make_unique<FiniteSource>(source, range, keep_nan);
 }
 
 }  // namespace voxkit::vq

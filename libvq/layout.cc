@@ -32,6 +32,7 @@ std::vector<std::byte> pack_params(const Params& params, uint64_t common) {
   store_le(&bytes[56], params.offset_bytes);
   store_le(&bytes[64], params.codebook_bytes);
   store_le(&bytes[72], static_cast<uint32_t>(params.offset_bits));
+  store_le(&bytes[76], params.special ? uint32_t{*params.special} + 1 : 0);
   return bytes;
 }
 
@@ -66,6 +67,12 @@ Result<ParamsAndView> unpack_params(std::span<const std::byte> bytes, const Volu
   p.offset_bytes = number(56);
   p.codebook_bytes = number(64);
   p.offset_bits = static_cast<int>(std::min<uint32_t>(load_le<uint32_t>(&bytes[72]), widest_entry));
+  if (const auto special = load_le<uint32_t>(&bytes[76]); special > 0) {
+    if (special > 1u << p.bits || (info.format != VoxelFormat::float32 && !info.fill))
+      return bad(76, fmt::format("code {} for no value: expected one of {} bits, and a fill value",
+                                 special - 1, p.bits));
+    p.special = static_cast<uint16_t>(special - 1);
+  }
   if (p.codebook == Codebook::packed && p.mapping == Mapping::direct)
     return bad(1, "a packed codebook mapped directly: expected mapping 2 (indirect)");
   const uint64_t bricks = product(bricks_of(info.dims));

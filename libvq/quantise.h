@@ -25,12 +25,16 @@ class Quantiser {
   /// A code stands for origin + step * code.
   double origin() const { return origin_; }
   double step() const { return step_; }
+  /// The code of NaN, or of the fill value of integers; none where no code is set apart.
+  std::optional<uint16_t> special() const { return special_; }
   /// The greatest error that a finite voxel may have.
   double bound() const { return bound_; }
 
  private:
   VoxelFormat format_{};
   double origin_ = 0, step_ = 1, bound_ = 0;
+  std::optional<uint16_t> special_;
+  double fill_ = 0;         ///< of integers with a special code: its stored value
   double lo_ = 0, hi_ = 0;  ///< FLOAT32: what is outside is brought to these
   std::vector<uint16_t>
       code_of_;  ///< of every stored value of an integer format; empty where nothing changes

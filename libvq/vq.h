@@ -51,6 +51,9 @@ struct Options {
   int zstd = 0;                            ///< level of zstd for the file's chunks, 1 to 19; 0: as they are
   /// FLOAT32: least and greatest stored value, as from `measure_range`.
   ValueRange range;
+  /// FLOAT32: NaN comes back as NaN, for which there is one level less. Not with k-means, which has no
+  /// averages of it.
+  bool keep_nan = false;
   /// Told before k-means begins, and then of the PSNR so far (of peak `full_scale`), after seeding and after
   /// each iteration, on the calling thread. May be empty.
   std::function<void()> clustering;
@@ -65,6 +68,8 @@ struct Params {
   uint64_t codewords = 0;  ///< bricks in the codebook
   double base = 0;         ///< the stored value of code 0 ...
   double step = 1;         ///< ... and the distance to that of the next one
+  /// The code that stands for no value of that kind: NaN of a FLOAT32 volume, the fill value of others.
+  std::optional<uint16_t> special;
   // For the reader's information.
   double max_error = 0;            ///< no voxel is further than this from the original; -1: no promise
   uint64_t unique_bricks = 0;      ///< of the volume that was compressed
@@ -92,15 +97,16 @@ Status validate(const Options& options, const VolumeInfo& info);
 /// integers without `max_error`. ErrorCode::usage where 16 bits do not suffice for what is asked.
 Result<double> error_bound(const Options& options, const VolumeInfo& info);
 
-/// Compresses `source` into a container written to `sink`, in one pass over the source. Not a number, and
-/// minus infinity, are encoded as the least value of a FLOAT32 volume, plus infinity as the greatest. Memory:
-/// the codebook, compressed, and 4 bytes for each brick; with k-means, what that takes for the unique bricks
-/// as well. What is written does not depend on ctx.threads.
+/// Compresses `source` into a container written to `sink`, in one pass over the source. Of a FLOAT32 volume
+/// minus infinity is encoded as the least value, plus infinity as the greatest, and not a number, without
+/// `keep_nan`, as the least. The fill value of an integer volume (VolumeInfo::fill) is exact with any
+/// `max_error`. Memory: the codebook, compressed, and 4 bytes for each brick; with k-means, what that takes
+/// for the unique bricks as well. What is written does not depend on ctx.threads.
 Result<Report> encode(VolumeSource& source, const Options& options, const ByteSink& sink, Context& ctx);
 
-/// A FLOAT32 volume as `encode` takes it, for comparing: not a number and minus infinity are range.lo, plus
-/// infinity is range.hi. `source` must outlive it.
-std::unique_ptr<VolumeSource> finite_source(VolumeSource& source, const ValueRange& range);
+/// A FLOAT32 volume as `encode` takes it, for comparing: minus infinity is range.lo, plus infinity range.hi,
+/// and not a number, without `keep_nan`, range.lo. `source` must outlive it.
+std::unique_ptr<VolumeSource> finite_source(VolumeSource& source, const ValueRange& range, bool keep_nan);
 
 /// A compressed volume, opened for random access. Safe on any bytes: every operation returns an error or a
 /// well-formed answer and touches only the chunks it needs. All const functions are thread-safe. For inner
@@ -128,6 +134,8 @@ class Volume {
   Status decode_brick(uint64_t id, Brick& codes) const;
   /// The voxel that a code stands for.
   Voxel voxel_of(uint16_t code) const;
+  /// What params().special stands for.
+  Voxel no_value() const;
 
   /// The voxel at a place inside the volume.
   Result<Voxel> sample(Index3 voxel) const;

@@ -104,13 +104,20 @@ Result<int> work(const Options& o, Run& run) {
   Inputs inputs(o.input, o.open, run.ctx);
   const bool lossless = o.delta ? *o.delta == 0 : o.quality.value_or(90) == 100;
   VOX_TRY(auto source, inputs.open(o.verify || (!lossless && !o.range)));
-  const VolumeInfo info = source->info();
-  VOX_TRY(svmm::Params params, params_of(o, info.format));
-  VOX_CHECK(svmm::validate(params, info));
+  VOX_TRY(svmm::Params params, params_of(o, source->info().format));
+  VOX_CHECK(svmm::validate(params, source->info()));
+  if (source->info().is_labels)
+    return bad_usage(
+        "labels have no averages, which coarser levels are made of: expected vq-encode for them");
   ValueRange range{0, 1};
+  if (!lossless && !o.range && source->info().format == VoxelFormat::float32) {
+    VOX_TRY(const Census census, look_at_floats(source, inputs, o.input, run));
+    range = census.range;
+  }
+  const VolumeInfo info = source->info();
   if (o.range) {
     range = {info.stored(o.range->lo), info.stored(o.range->hi)};
-  } else if (!lossless && (info.format == VoxelFormat::density16 || info.format == VoxelFormat::float32)) {
+  } else if (!lossless && info.format == VoxelFormat::density16) {
     run.stage("measure");
     VOX_TRY(range, measure_range(*source, run.ctx));
     if (source->forward_only()) {
@@ -125,6 +132,8 @@ Result<int> work(const Options& o, Run& run) {
   VOX_TRY(const auto levels, svmm::encode(
                                  *source, params, [&](auto bytes) { return out->write(bytes); }, run.ctx));
   Encoding encoding{o.input, o.output, info, out->position(), run.seconds() - start, {}};
+  encoding.lossless = params.delta == 0 && params.base == svmm::Base::raw &&
+                      params.layout == svmm::Layout::plain && !info.rounded;
 
   if (o.verify) {
     run.stage("verify");

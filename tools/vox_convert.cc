@@ -3,6 +3,7 @@
 
 #include "formats/convert.h"
 #include "formats/copy.h"
+#include "formats/fill.h"
 #include "formats/orient.h"
 #include "formats/volume/open_volume.h"
 #include "formats/volume/readers.h"
@@ -92,6 +93,7 @@ Result<int> work(Options& o, Run& run) {
     VOX_TRY(source, retyped(
                         std::move(source), [&] { return open(o, run.ctx); }, o.output_type, o.range, run));
   }
+  source = fill_restored(std::move(source));
   const VolumeInfo info = source->info();
   VOX_TRY(auto sink, create_volume(o.output, info, run.options.force, run.ctx));
   run.stage("convert");

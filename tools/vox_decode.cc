@@ -3,6 +3,7 @@
 
 #include "formats/convert.h"
 #include "formats/copy.h"
+#include "formats/fill.h"
 #include "formats/volume/open_volume.h"
 #include "formats/volume/readers.h"
 #include "tools/common/input.h"
@@ -117,6 +118,7 @@ Result<int> work(const Options& o, Run& run) {
     VOX_TRY(source, crop(std::move(source), part, run.ctx));
   }
   VOX_TRY(source, retyped(std::move(source), nullptr, o.type, o.range, run));
+  source = fill_restored(std::move(source));
   const VolumeInfo info = source->info();
   VOX_TRY(auto sink, create_volume(o.output, info, run.options.force, run.ctx));
   run.stage("decode");

@@ -104,19 +104,21 @@ Result<int> work(const Options& o, Run& run) {
   // Of floats the range must be known first. What kind of voxels there are, the input tells only when it is
   // open.
   VOX_TRY(auto source, inputs.open(true));
-  const VolumeInfo info = source->info();
-  if (const Status valid = vq::validate(options, info); !valid) {
+  if (const Status valid = vq::validate(options, source->info()); !valid) {
     Error error = valid.error();
     if (error.code == ErrorCode::input) error.file = o.input;
     return tl::unexpected<Error>(error);
   }
-  if (info.format == VoxelFormat::float32) {
-    run.stage("measure");
-    VOX_TRY(options.range, measure_range(*source, run.ctx));
-    if (source->forward_only()) {
-      VOX_TRY(source, inputs.open(true));
-    }
+  if (source->info().format == VoxelFormat::float32) {
+    VOX_TRY(const Census census, look_at_floats(source, inputs, o.input, run));
+    options.range = census.range;
+    const bool clusters = options.codewords > 0 || options.reduce > 0;
+    options.keep_nan = census.has_nan && !(clusters && !source->info().fill);
+    if (source->info().fill) VOX_CHECK(vq::validate(options, source->info()));
   }
+  const VolumeInfo info = source->info();
+  if (info.is_labels && (options.max_error.value_or(0) > 0 || options.codewords > 0 || options.reduce > 0))
+    return bad_usage("labels have no values between them: expected --lossless");
   VOX_TRY(const double bound, vq::error_bound(options, info));
   if (o.lossless && bound > 0)
     return bad_usage(
@@ -134,6 +136,7 @@ Result<int> work(const Options& o, Run& run) {
           vq::encode(
               *source, options, [&](auto bytes) { return out->write(bytes); }, run.ctx));
   Encoding encoding{o.input, o.output, info, out->position(), run.seconds() - start, {}};
+  encoding.lossless = report.params.max_error == 0 && !report.replaced && !info.rounded;
 
   if (o.verify) {
     run.stage("verify");
@@ -142,7 +145,8 @@ Result<int> work(const Options& o, Run& run) {
     }
     VOX_TRY(const Input decoded, open_compressed(out->temporary(), 0, run.ctx));
     // What is no number has no error: it is compared with what it was taken for.
-    const auto finite = report.replaced ? vq::finite_source(*source, options.range) : nullptr;
+    const auto finite =
+        report.replaced ? vq::finite_source(*source, options.range, options.keep_nan) : nullptr;
     VOX_TRY(encoding.diff,
             diff_volumes(finite ? *finite : *source, *decoded.source, std::nullopt, nullptr, run.ctx));
     if (!keeps_promise(report.params, *encoding.diff)) {
@@ -158,8 +162,9 @@ Result<int> work(const Options& o, Run& run) {
   if (run.options.json) VOX_CHECK(print(json_of(encoding, run, report).text()));
   if (!run.options.quiet && !run.options.json) print_encoding(encoding);
   if (!run.options.quiet && report.replaced)
-    fmt::print(stderr, "{}: {}: voxels that are NaN or infinite became the least or the greatest value\n",
-               run.tool, o.input);
+    fmt::print(stderr, "{}: {}: {}\n", run.tool, o.input,
+               options.keep_nan ? "voxels that are infinite became the least or the greatest value"
+                                : "voxels that are NaN or infinite became the least or the greatest value");
   return 0;
 }
 

@@ -258,6 +258,7 @@ SinkResult create_mrc(const std::string& path, const VolumeInfo& info, bool forc
                   fmt::format("a side of {} voxels: expected less than 2^31 in MRC", info.dims[i]));
   SampleLayout layout = storage_layout(info);
   if (info.format == VoxelFormat::bitmap) layout.type = SampleType::u8;
+  if (info.format == VoxelFormat::float32) layout.type = SampleType::f32;
   VOX_TRY(auto file, OutputFile::create(path, force));
   VOX_CHECK(file->write(make_header(info, layout).bytes));
   return std::make_unique<MrcSink>(std::move(file), info, layout);

@@ -208,6 +208,14 @@ std::string_view type_name(SampleType type) {
       return "uint16";
     case SampleType::i16:
       return "int16";
+    case SampleType::u32:
+      return "uint32";
+    case SampleType::i32:
+      return "int32";
+    case SampleType::u64:
+      return "uint64";
+    case SampleType::i64:
+      return "int64";
     case SampleType::f32:
       return "float";
     default:

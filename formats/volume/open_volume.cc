@@ -111,7 +111,16 @@ Result<std::unique_ptr<VolumeSink>> create_volume(const std::string& name, const
   if (!checked_voxels(info.dims))
     return fail(ErrorCode::internal, name, "the volume to write has no voxels, or too many");
   if (name == "-") return create_nrrd(name, info, force, ctx);
-  switch (kind_of(name)) {
+  const Kind kind = kind_of(name);
+  if (is_wide(info.sample_type) && info.format != VoxelFormat::float32 && !is_colour(info.format) &&
+      (kind == Kind::mrc || kind == Kind::vdb || kind == Kind::image))
+    return fail(
+        ErrorCode::usage, name,
+        fmt::format(
+            "files with this ending hold no {}: expected .nrrd, .nii or .raw, or another type (--type, or "
+            "--output-type of vox-convert)",
+            voxkit::name(info.sample_type)));
+  switch (kind) {
     case Kind::nrrd:
       return create_nrrd(name, info, force, ctx);
     case Kind::nifti:

@@ -139,7 +139,9 @@ Result<BrickRanges> BrickRanges::of(const vq::Volume& volume, Context& ctx) {
   const Index3 bricks = ranges.bricks_;
   const vq::MappedPools pools(volume);
   const vq::Reader<vq::MappedPools> reader(volume.view(), pools);
-  const auto value = [&](uint16_t code) {
+  const auto value = [&](uint16_t code) -> float {
+    // Ranges are of values; the code for none is above those of all others.
+    if (volume.info().format == VoxelFormat::float32 && volume.params().special == code && code > 0) --code;
     const Voxel voxel = volume.voxel_of(code);
     return volume.info().format == VoxelFormat::float32 ? voxel.as<float>()
                                                         : static_cast<float>(voxel.as<uint32_t>());

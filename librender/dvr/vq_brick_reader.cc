@@ -39,7 +39,7 @@ class VqReader final : public BrickReader<T> {
     offset_ = static_cast<uint16_t>(params.base);
     // Codes that are values less a constant, none of them too large.
     if constexpr (!std::is_floating_point_v<T>)
-      only_offset_ = params.step == 1 && params.base >= 0 &&
+      only_offset_ = params.step == 1 && params.base >= 0 && !params.special &&
                      params.base + static_cast<double>((1 << params.bits) - 1) <= most;
   }
 
@@ -90,6 +90,12 @@ class VqReader final : public BrickReader<T> {
     return only_offset_ ? static_cast<T>(code + offset_) : value_of<T>(volume_->voxel_of(code));
   }
 
+  /// The end of a range: the code for no value is above those of all others.
+  float greatest(uint16_t code) const {
+    return static_cast<float>(
+        value(volume_->params().special == code && code > 0 ? static_cast<uint16_t>(code - 1) : code));
+  }
+
   void find(uint32_t x, uint32_t y, uint32_t z, Part& part) {
     part.x = x, part.y = y, part.z = z;
     part.id = reader_.brick_id(x, y, z);
@@ -97,8 +103,7 @@ class VqReader final : public BrickReader<T> {
     if (part.known) return;
     // What is damaged shows anything: the store has the error.
     if (part.id == reader_.no_brick || !reader_.find(part.id, part.record)) part.record = {};
-    part.extent = {static_cast<float>(value(part.record.range.min)),
-                   static_cast<float>(value(part.record.range.max))};
+    part.extent = {static_cast<float>(value(part.record.range.min)), greatest(part.record.range.max)};
     part.shows = shows(part.extent);
   }
 

@@ -33,7 +33,7 @@ Bytes file_of(int zstd) {
         file.insert(file.end(), bytes.begin(), bytes.end());
         return Status{};
       },
-      Codec::svmm, zstd, memory);
+      Codec::svmm, 1, zstd, memory);
   uint64_t part = 0;
   for (const size_t size : {flat, noise, little}) EXPECT_TRUE(writer.add(kind, 0, part++, chunk_of(size)));
   EXPECT_TRUE(writer.finish());

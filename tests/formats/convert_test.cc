@@ -106,7 +106,7 @@ TEST_F(ConvertTest, NarrowingStretchesTheRangeAndKeepsRealValues) {
     ASSERT_EQ(out.size(), 1000u);
     EXPECT_EQ(out[0], 0);
     EXPECT_EQ(out[1], 255);
-    const int bias = last_.bias();
+    const auto bias = static_cast<int>(last_.bias());
     EXPECT_EQ(255 - bias, greatest);
     for (size_t i = 0; i < 1000; ++i) {
       // Nearest integer, halves up: floor((2 (v - lo) 255 + d) / 2d).

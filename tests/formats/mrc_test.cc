@@ -52,7 +52,7 @@ TEST_F(MrcTest, EveryModeInBothOrders) {
     EXPECT_EQ(read_info_.affine.spacing(), (std::array<double, 3>{0.5, 1, 1.5}));
     expect_voxels(Header(12, dims, big).bytes + sample_text<uint16_t>({0x3c00, 0xc100}, big),
                   sample_text<float>({1, -2.5}, false));
-    EXPECT_EQ(read_info_.sample_type, SampleType::f32);
+    EXPECT_EQ(read_info_.sample_type, SampleType::f16);
   }
 }
 

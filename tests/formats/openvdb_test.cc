@@ -11,6 +11,12 @@
 namespace voxkit {
 namespace {
 
+OpenOptions grid_named(const std::string& name) {
+  OpenOptions options;
+  options.grid = name;
+  return options;
+}
+
 class OpenVdb : public FileFormatTest {
  protected:
   void SetUp() override {
@@ -25,7 +31,7 @@ class OpenVdb : public FileFormatTest {
   /// Opens, with the whole volume in `voxels`.
   std::unique_ptr<VolumeSource> read_vdb(const std::string& name, Bytes& voxels,
                                          const std::string& grid = {}) {
-    auto source = open_vdb(path(name), {.grid = grid}, ctx_);
+    auto source = open_vdb(path(name), grid_named(grid), ctx_);
     EXPECT_TRUE(source) << source.error().what;
     if (!source) return nullptr;
     auto all = read(**source);
@@ -265,7 +271,7 @@ TEST_F(OpenVdb, GridsAreFoundByName) {
   ASSERT_TRUE(read_vdb("color.vdb", alone));
   EXPECT_EQ(named, alone);
 
-  const auto missing = open_vdb(path("both.vdb"), {.grid = "fuel"}, ctx_);
+  const auto missing = open_vdb(path("both.vdb"), grid_named("fuel"), ctx_);
   ASSERT_FALSE(missing);
   EXPECT_EQ(missing.error().code, ErrorCode::input);
   EXPECT_NE(missing.error().what.find("density (Tree_float_5_4_3), color (Tree_vec3s_5_4_3)"),
@@ -276,7 +282,7 @@ TEST_F(OpenVdb, GridsAreFoundByName) {
   put("int.vdb", replaced(get(path("both.vdb")), "Tree_float_5_4_3", "Tree_int32_5_4_3"));
   ASSERT_TRUE(read_vdb("int.vdb", named));
   EXPECT_EQ(named, alone);
-  const auto refused = open_vdb(path("int.vdb"), {.grid = "density"}, ctx_);
+  const auto refused = open_vdb(path("int.vdb"), grid_named("density"), ctx_);
   ASSERT_FALSE(refused);
   EXPECT_NE(refused.error().what.find("unsupported grid type Tree_int32_5_4_3"), std::string::npos);
   put("only.vdb", replaced(get(path("density.vdb")), "Tree_float_5_4_3", "Tree_int32_5_4_3"));

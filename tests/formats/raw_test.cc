@@ -1,5 +1,6 @@
 #include <cmath>
 
+#include "formats/copy.h"
 #include "formats/volume/dense_source.h"
 #include "tests/formats/file_format_test.h"
 
@@ -59,7 +60,7 @@ TEST_F(RawTest, WideIntegersAreExact) {
       ASSERT_TRUE(sink);
       ASSERT_TRUE(copy_volume(**source, info.box(), **sink, ctx_));
       ASSERT_TRUE((*sink)->finish());
-      EXPECT_EQ(get("back.raw"), sample_text<T>(values, false)) << type;
+      EXPECT_EQ(get(path("back.raw")), sample_text<T>(values, false)) << type;
     }
   };
   round_trip("u32", std::vector<uint32_t>{4000000000u, 4000000255u, 4000000001u}, VoxelFormat::density8);

@@ -13,6 +13,11 @@
 namespace voxkit::cli {
 
 Result<std::unique_ptr<VolumeSource>> Inputs::open(bool wanted_again) {
+  VOX_TRY(auto source, open_as_it_is(wanted_again));
+  return found_fill_ ? with_fill(std::move(source), *found_fill_) : std::move(source);
+}
+
+Result<std::unique_ptr<VolumeSource>> Inputs::open_as_it_is(bool wanted_again) {
   if (name_ != "-" || (!wanted_again && !spooled_)) {
     VOX_TRY(Input input, open_input(name_, open_, ctx_));
     return std::move(input.source);
@@ -23,6 +28,26 @@ Result<std::unique_ptr<VolumeSource>> Inputs::open(bool wanted_again) {
   }
   VOX_TRY(Input input, open_spooled(spooled_, open_, ctx_));
   return std::move(input.source);
+}
+
+Result<Census> look_at_floats(std::unique_ptr<VolumeSource>& source, Inputs& inputs, const std::string& input,
+                              Run& run) {
+  run.stage("measure");
+  VOX_TRY(Census census, take_census(*source, run.ctx));
+  const bool has_fill = source->info().fill.has_value();
+  if (source->forward_only()) {
+    VOX_TRY(source, inputs.open(true));
+  }
+  if (has_fill || !census.outlier) return census;
+  run.say(fmt::format(
+      "{}: the value {:.9g} lies more than 1000 times the range of all others away: it is taken as a fill "
+      "value (--fill V names another)",
+      input, *census.outlier));
+  inputs.set_fill(*census.outlier);
+  source = with_fill(std::move(source), *census.outlier);
+  census.range = census.rest;
+  census.has_nan = true;
+  return census;
 }
 
 void declare_zstd(CommandLine& line, int& level) {
@@ -47,6 +72,7 @@ Json encoding_json(const Encoding& e, const Run& run, Json params) {
   json.set("tool", run.tool).set("version", version_text()).set("input", e.input).set("output", e.output);
   json.set("dims", e.info.dims).set("voxel_format", name(e.info.format)).set("raw_bytes", raw_bytes(e.info));
   json.set("file_bytes", e.file_bytes).set("percent", 100 * bytes / raw).set("ratio", raw / bytes);
+  json.set("lossless", e.lossless);
   json.set("bits_per_voxel", 8 * bytes / static_cast<double>(*checked_voxels(e.info.dims)));
   json.set("encode_seconds", e.seconds).set("input_mb_per_s", raw / 1e6 / e.seconds);
   json.set("peak_rss_bytes", peak_rss_bytes())
@@ -63,10 +89,13 @@ void add_verified(const Encoding& e, Json& json) {
 }
 
 void print_encoding(const Encoding& e) {
-  const double raw = static_cast<double>(raw_bytes(e.info));
+  const double raw = static_cast<double>(raw_bytes(e.info)), bytes = static_cast<double>(e.file_bytes);
+  std::string share = fmt::format("{:.4g} % of raw", 100 * bytes / raw);
+  if (const auto input = file_bytes(e.input); input && *input > 0)
+    share += fmt::format(", {:.4g} % of the input", 100 * bytes / static_cast<double>(*input));
   fmt::print(
-      stderr, "{}: {} -> {} bytes ({:.4g} %) in {:.2f} s{}\n", e.output, raw_bytes(e.info), e.file_bytes,
-      100 * static_cast<double>(e.file_bytes) / raw, e.seconds,
+      stderr, "{}: {} -> {} bytes ({}), {}, in {:.2f} s{}\n", e.output, raw_bytes(e.info), e.file_bytes,
+      share, e.lossless ? "lossless" : "lossy", e.seconds,
       e.diff ? fmt::format(", {} dB, greatest error {:.6g}", readable(e.diff->psnr_db), e.diff->max_abs_error)
              : "");
 }

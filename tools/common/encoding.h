@@ -5,6 +5,7 @@
 #include <optional>
 #include <string>
 
+#include "formats/fill.h"
 #include "libmetrics/volume_diff.h"
 #include "tools/common/input.h"
 #include "tools/common/json.h"
@@ -18,13 +19,23 @@ class Inputs {
   Inputs(const std::string& name, const OpenOptions& open, Context& ctx)
       : name_(name), open_(open), ctx_(ctx) {}
   Result<std::unique_ptr<VolumeSource>> open(bool wanted_again);
+  /// What is opened from now on has this fill value.
+  void set_fill(double fill) { found_fill_ = fill; }
 
  private:
   const std::string& name_;
   const OpenOptions& open_;
   Context& ctx_;
+  Result<std::unique_ptr<VolumeSource>> open_as_it_is(bool wanted_again);
   std::shared_ptr<const MappedFile> spooled_;
+  std::optional<double> found_fill_;
 };
+
+/// Before a FLOAT32 volume is encoded with a loss: its range, and a value that is likely to stand for nothing
+/// measured is taken as its fill value, unless it has one already, and said. A forward-only source is opened
+/// again by `inputs`.
+Result<Census> look_at_floats(std::unique_ptr<VolumeSource>& source, Inputs& inputs, const std::string& input,
+                              Run& run);
 
 /// The checks of an encoder before any work: of its output, alone and beside the input and its options.
 Status check_encoding(const std::string& input, const std::string& output, bool verify, const Run& run);
@@ -39,6 +50,7 @@ struct Encoding {
   uint64_t file_bytes = 0;
   double seconds = 0;
   std::optional<VolumeDiff> diff;  ///< with --verify
+  bool lossless = false;           ///< every sample of the input comes back as it was
 };
 /// The keys that all encoders begin with; `params` and those of --verify are added.
 Json encoding_json(const Encoding& encoding, const Run& run, Json params);

@@ -1,5 +1,7 @@
 #include "tools/common/input.h"
 
+#include <fmt/core.h>
+
 #include <array>
 #include <cmath>
 #include <filesystem>
@@ -8,6 +10,7 @@
 #include <utility>
 
 #include "formats/container.h"
+#include "formats/fill.h"
 #include "formats/input_stream.h"
 #include "formats/mapped_file.h"
 #include "formats/volume/readers.h"
@@ -145,7 +148,9 @@ Result<Input> open_spooled(std::shared_ptr<const MappedFile> file, const OpenOpt
   return input;
 }
 
-Result<Input> open_input(const std::string& name, const OpenOptions& options, Context& ctx) {
+namespace {
+
+Result<Input> open_as_it_is(const std::string& name, const OpenOptions& options, Context& ctx) {
   if (is_compressed(name)) return open_compressed(name, 0, ctx);
   if (color::is_terrain(name))
     return fail(ErrorCode::usage, name,
@@ -162,6 +167,22 @@ Result<Input> open_input(const std::string& name, const OpenOptions& options, Co
   }
   VOX_TRY(auto file, MappedFile::spool(*peeked.stream));
   return open_spooled(std::move(file), options, ctx);
+}
+
+}  // namespace
+
+Result<Input> open_input(const std::string& name, const OpenOptions& options, Context& ctx) {
+  VOX_TRY(Input input, open_as_it_is(name, options, ctx));
+  if (is_compressed(name) || !input.source) return input;
+  const VolumeInfo& info = input.source->info();
+  if (options.fill && is_colour(info.format))
+    return bad_usage(fmt::format("--fill: voxels are {}: expected scalars", voxkit::name(info.format)));
+  const auto fill =
+      options.fill
+          ? std::optional(info.format == VoxelFormat::float32 ? *options.fill : info.stored(*options.fill))
+          : info.fill;
+  if (fill) input.source = with_fill(std::move(input.source), *fill);
+  return input;
 }
 
 std::optional<uint64_t> file_bytes(const std::string& name) {
