@@ -7,6 +7,30 @@
 #include "libcolor/textures/image_codec.h"
 
 namespace voxkit::color {
+namespace {
+
+/// Colours below the root, as the nodes say. With counts beside pointers, where no node says how many it has,
+/// those on the way to the last octant do.
+uint64_t all_colors(const DagView& view) {
+  if (view.counts == Counts::node) return view.colors_below(view.height, view.root);
+  uint64_t before = 0;
+  uint32_t pointer = view.root;
+  OrderState state = first_state(view.curve);
+  for (int h = view.height; h > leaf_height; --h) {
+    const NodeRef node = view.node(h, pointer);
+    if (node.words == nullptr || node.mask == 0) return ~uint64_t{0};
+    uint8_t last = 0;
+    for (const uint8_t octant : octant_orders.octant[state])
+      if (node.has(octant)) last = octant;
+    const ChildRef child = view.child(node, h, last, state);
+    before += child.colors_before;
+    pointer = child.pointer;
+    state = octant_orders.next[state][last];
+  }
+  return before + leaf_colors(view.leaf(pointer), view.colors);
+}
+
+}  // namespace
 
 Status Store::find_chunks(const Container& container, const Params& params) {
   const auto& table = container.table();
@@ -98,6 +122,10 @@ Result<const DagView*> Store::dag(const Container& container, const Params& para
     view.nodes[h + leaf_height + 1] = reinterpret_cast<const uint32_t*>(nodes.data());
     view.words[h + leaf_height + 1] = nodes.size() / sizeof(uint32_t);
   }
+  if (params.leaf_voxels > 0 && all_colors(view) != params.color_count)
+    return bad_input(container.name(),
+                     fmt::format("chunk DAGP, byte 8: {} colors: expected {}, as the root of the DAG has",
+                                 params.color_count, all_colors(view)));
   view_ = view;
   ready_.store(&*view_, std::memory_order_release);
   return &*view_;
@@ -112,6 +140,11 @@ const std::byte* Store::verify(uint64_t number, const Container& container) cons
   const std::lock_guard lock(mutex_);
   if (status_) status_ = tl::unexpected<Error>(chunk.error());
   return nullptr;
+}
+
+void Store::report(const Container& container, const std::string& what) const {
+  const std::lock_guard lock(mutex_);
+  if (status_) status_ = bad_input(container.name(), what);
 }
 
 void Store::decode_images(const Container& container, const Params& params, MemoryBudget& memory) {
@@ -166,6 +199,7 @@ bool ColorReader::open(uint64_t part) {
   if (has_threshold(params_.codec))
     view_ = PartView(bytes_, store_.part_bytes(part), colors_of_part(params_.color_count, part),
                      params_.endpoints);
+  if (has_threshold(params_.codec) && !view_.valid()) damaged("fewer bytes than its blocks take");
   return true;
 }
 
@@ -176,13 +210,20 @@ void ColorReader::find(uint32_t within) {
   macro_ = view_.macro_block(number);
   if (macro_.raw) return;
   const uint32_t block = view_.find_block(macro_, within - base);
-  if (block == macro_.last) return;
+  if (block == macro_.last) return damaged("a macro block has not its blocks");
   block_ = view_.block(block);
   first_ = base + block_.first;
   const uint32_t end = colors_of_part(params_.color_count, part_);
   last_ = block + 1 < macro_.last ? base + view_.first_color(block + 1)
                                   : std::min(end, base + macro_block_colors);
-  if (last_ < first_) last_ = first_;
+  if (last_ <= first_) {
+    last_ = first_;
+    damaged("blocks out of order");
+  }
+}
+
+void ColorReader::damaged(const char* what) const {
+  store_.report(container_, fmt::format("chunk COLR 0.{}: {}", part_, what));
 }
 
 }  // namespace voxkit::color

@@ -36,8 +36,10 @@ class Store {
   /// tells.
   bool decodes_parts() const { return decoded_ != nullptr; }
   std::shared_ptr<const DecodedParts::Part> decoded(uint64_t number) const;
-  /// The first damaged part that was met.
+  /// The first damage that was met.
   Status status() const;
+  /// Of damage that a reader finds: it becomes `status`, unless there is one.
+  [[gnu::cold]] void report(const Container& container, const std::string& what) const;
 
  private:
   Status find_palette(const Container& container, const Params& params);
@@ -64,7 +66,10 @@ class ColorReader {
       : store_(store), container_(container), params_(params) {}
   /// Black where there is no such colour, or it is damaged.
   Rgb color(uint64_t index) {
-    if (index >= params_.color_count) return {};
+    if (index >= params_.color_count) {
+      store_.report(container_, "chunk NODE: counts of colors that do not add up");
+      return {};
+    }
     const uint64_t part = index >> part_log2;
     if (part != part_ && !open(part)) return {};
     const auto within = static_cast<uint32_t>(index & (part_colors - 1));
@@ -82,6 +87,7 @@ class ColorReader {
  private:
   bool open(uint64_t part);
   void find(uint32_t within);
+  [[gnu::cold]] void damaged(const char* what) const;
 
   const Store& store_;
   const Container& container_;

@@ -182,6 +182,12 @@ Status Volume::for_each_voxel(const SurfaceSource::Sink& sink, Context&) const {
         const uint64_t first = morton_code(static_cast<uint32_t>(corner.x), static_cast<uint32_t>(corner.y),
                                            static_cast<uint32_t>(corner.z));
         // A word without voxels is of no surface, and there may be any number of them.
+        // Counts that do not add up would give voxels the colors of others. (Along a Hilbert curve they come
+        // in another order.)
+        if (view->colors == Colors::leaf && view->curve == Curve::morton && color != found) {
+          store_->report(*container_, "chunk NODE: counts of colors that do not add up");
+          return false;
+        }
         found += static_cast<uint64_t>(std::popcount(leaf));
         if (leaf == 0 || found > params_.leaf_voxels) return false;
         for (uint64_t left = leaf; left != 0; left &= left - 1) {
@@ -191,6 +197,7 @@ Status Volume::for_each_voxel(const SurfaceSource::Sink& sink, Context&) const {
         return run.size() < run_voxels || flush();
       });
   if (complete) flush();
+  if (status) status = store_->status();
   if (status && (!complete || found != params_.leaf_voxels))
     return bad_input(container_->name(),
                      fmt::format("chunk DAGP, byte 8: {} voxels: others are there", params_.leaf_voxels));

@@ -391,10 +391,11 @@ Result<VolumeDiff> diff_volumes(VolumeSource& a, VolumeSource& b, std::optional<
 
     if (!known(slab, total, histogram)) {
       for (const Side& side : sides) side.source.expect(slab.lo.z, slab.hi.z);
-      std::vector<Sums> parts(static_cast<size_t>(Slabs::tiles(slab)));
-      const Status status = parallel_for(ctx, Slabs::tiles(slab), [&](int64_t t) -> Status {
+      // Some tiles at a time, whose sums are then added in order: of a hostile file there may be any number.
+      constexpr int64_t batch = 4096;
+      std::vector<Sums> parts;
+      const auto compare_tile = [&](int64_t t, Sums& sums) -> Status {
         const Box tile = Slabs::tile(slab, t);
-        Sums& sums = parts[static_cast<size_t>(t)];
         std::unique_ptr<std::byte[]> own[2];
         std::optional<ErrorHistogram> counts;
         if (histogram != nullptr) counts.emplace(kind);
@@ -415,9 +416,15 @@ Result<VolumeDiff> diff_volumes(VolumeSource& a, VolumeSource& b, std::optional<
           histogram->add(*counts);
         }
         return {};
-      });
-      VOX_CHECK(status);
-      for (const Sums& part : parts) total.merge(part);
+      };
+      const int64_t tiles = Slabs::tiles(slab);
+      for (int64_t first = 0; first < tiles; first += batch) {
+        parts.assign(static_cast<size_t>(std::min(batch, tiles - first)), {});
+        VOX_CHECK(parallel_for(ctx, static_cast<int64_t>(parts.size()), [&](int64_t i) {
+          return compare_tile(first + i, parts[static_cast<size_t>(i)]);
+        }));
+        for (const Sums& part : parts) total.merge(part);
+      }
       for (const Side& side : sides) side.source.release(slab.lo.z, slab.hi.z);
     }
     if (errors != nullptr)

@@ -103,6 +103,8 @@ Result<int> work(const Options& o, Run& run) {
     return fail(ErrorCode::usage, o.input, "points and models are made of surfaces: expected a .dagc file");
   if (input.color && is_surface_output(o.output) && !o.roi && !o.type)
     return write_voxels(o, *input.color, run);
+  // Boxes are found by counts, of which each box follows but a few.
+  if (input.color && !o.roi) VOX_CHECK(input.color->check(run.ctx));
   auto source = std::move(input.source);
   if (o.roi) {
     const VolumeInfo whole = input.svmm ? input.svmm->info() : source->info();
