@@ -109,22 +109,24 @@ Result<int> work(const Options& o, Run& run) {
   if (source->info().is_labels)
     return bad_usage(
         "labels have no averages, which coarser levels are made of: expected vq-encode for them");
+  const VoxelFormat format = source->info().format;
+  if (o.range && format != VoxelFormat::density16 && format != VoxelFormat::float32)
+    return bad_usage(fmt::format(
+        "--range: {} voxels have a full scale of their own: expected 16 bit or float voxels", name(format)));
   ValueRange range{0, 1};
   if (!lossless && !o.range && source->info().format == VoxelFormat::float32) {
     VOX_TRY(const Census census, look_at_floats(source, inputs, o.input, run));
     range = census.range;
   }
   const VolumeInfo info = source->info();
-  if (o.range) {
-    range = {info.stored(o.range->lo), info.stored(o.range->hi)};
-  } else if (!lossless && info.format == VoxelFormat::density16) {
+  if (!o.range && !lossless && info.format == VoxelFormat::density16) {
     run.stage("measure");
     VOX_TRY(range, measure_range(*source, run.ctx));
     if (source->forward_only()) {
       VOX_TRY(source, inputs.open(true));
     }
   }
-  params.full_scale = full_scale(info, range);
+  params.full_scale = o.range ? o.range->hi - o.range->lo : full_scale(info, range);
 
   VOX_TRY(auto out, OutputFile::create(o.output, run.options.force));
   run.stage("encode");

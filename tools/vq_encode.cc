@@ -7,6 +7,7 @@
 
 #include "formats/copy.h"
 #include "formats/output_file.h"
+#include "libvq/error_step.h"
 #include "libvq/vq.h"
 #include "tools/common/encoding.h"
 #include "tools/common/vq_report.h"
@@ -119,6 +120,14 @@ Result<int> work(const Options& o, Run& run) {
   const VolumeInfo info = source->info();
   if (info.is_labels && (options.max_error.value_or(0) > 0 || options.codewords > 0 || options.reduce > 0))
     return bad_usage("labels have no values between them: expected --lossless");
+  if (options.max_error.value_or(0) >=
+      (info.format == VoxelFormat::float32 ? std::numeric_limits<double>::min() : 2)) {
+    run.stage("choose steps");
+    VOX_TRY(options.max_error, vq::smallest_error_step(*source, *options.max_error, options, run.ctx));
+    if (source->forward_only()) {
+      VOX_TRY(source, inputs.open(true));
+    }
+  }
   VOX_TRY(const double bound, vq::error_bound(options, info));
   if (o.lossless && bound > 0)
     return bad_usage(

@@ -21,7 +21,8 @@ struct Input {
   std::shared_ptr<const color::Volume> color;  ///< null for all but .dagc
 };
 
-/// Declares --dims, --endian, --grid and what else OpenOptions has, and with `type` also --type as the type of a .raw input.
+/// Declares --dims, --endian, --grid and what else OpenOptions has, and with `type` also --type as the type
+/// of a .raw input.
 void declare_input_options(CommandLine& line, OpenOptions& options, bool type = true);
 
 /// Opens a file, a built-in, or standard input ("-": a container or NRRD, told apart by its first bytes).
