@@ -16,7 +16,7 @@ namespace voxkit::vq {
 namespace {
 
 constexpr uint64_t most_samples = 2048;
-constexpr int sixteenths = 16, octaves = 2;  // of the scale, and how far below `most` it is searched
+constexpr int octaves = 2;  // below `most`, in which the scale is searched
 constexpr double whole_up_to = 32;
 
 /// Errors of the scale from `octaves` below `most` on, ascending.
@@ -25,9 +25,10 @@ std::vector<double> scale_up_to(double most, bool integers) {
   if (integers)
     for (double e = std::max(1.0, std::floor(most / 4)); e <= std::min(most, whole_up_to); ++e)
       scale.push_back(e);
-  const int last = static_cast<int>(std::floor(std::log2(most) * sixteenths));
-  for (int k = last - octaves * sixteenths; k <= last + 1; ++k) {
-    double e = std::exp2(static_cast<double>(k) / sixteenths);
+  const int steps = integers ? 16 : 64;  // of an octave
+  const int last = static_cast<int>(std::floor(std::log2(most) * steps));
+  for (int k = last - octaves * steps; k <= last + 1; ++k) {
+    double e = std::exp2(static_cast<double>(k) / steps);
     if (integers) e = std::floor(e);
     if (e <= most && (!integers || e > whole_up_to) && (scale.empty() || e > scale.back()))
       scale.push_back(e);
