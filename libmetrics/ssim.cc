@@ -222,7 +222,7 @@ Sums sums_generic(Block& block, const Windows& w) {
   return block.sums(w.a, w.b, w.x0, w.y0, w.x1, w.y1);
 }
 #ifdef VOXKIT_AVX2
-[[gnu::target("avx2")]] Sums sums_avx2(Block& block, const Windows& w) {
+VOXKIT_AVX2_CODE Sums sums_avx2(Block& block, const Windows& w) {
   return block.sums(w.a, w.b, w.x0, w.y0, w.x1, w.y1);
 }
 #else

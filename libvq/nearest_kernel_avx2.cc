@@ -7,7 +7,7 @@
 namespace voxkit::vq {
 namespace {
 
-#define VOXKIT_CODE [[gnu::target("avx2,popcnt")]]
+#define VOXKIT_CODE VOXKIT_AVX2_CODE
 #define VOXKIT_INLINE VOXKIT_CODE [[gnu::always_inline]] inline
 
 constexpr size_t lanes = 8;

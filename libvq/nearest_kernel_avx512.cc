@@ -7,7 +7,7 @@
 namespace voxkit::vq {
 namespace {
 
-#define VOXKIT_CODE [[gnu::target("avx512f,avx512bw,avx512dq,avx512vnni,popcnt")]]
+#define VOXKIT_CODE VOXKIT_AVX512_CODE
 #define VOXKIT_INLINE VOXKIT_CODE [[gnu::always_inline]] inline
 
 constexpr size_t lanes = 16;
@@ -56,11 +56,6 @@ VOXKIT_INLINE uint32_t sum(Vector v) {
 
 }  // namespace
 
-bool has_avx512() {
-  return __builtin_cpu_supports("avx512f") && __builtin_cpu_supports("avx512bw") &&
-         __builtin_cpu_supports("avx512dq") && __builtin_cpu_supports("avx512vnni") &&
-         __builtin_cpu_supports("popcnt");
-}
 const Kernels& avx512_kernels(bool narrow) {
   return narrow ? narrow_kernels : wide_kernels;
 }

@@ -8,9 +8,6 @@
 
 namespace voxkit::vq {
 
-/// Whether code for AVX-512 with VNNI may run here.
-bool has_avx512();
-
 const Kernels& avx2_kernels(bool narrow);
 const Kernels& avx512_kernels(bool narrow);
 

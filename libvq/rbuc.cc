@@ -53,7 +53,7 @@ void transform_all_generic(const Brick& brick, BrickRange range, Residuals& out)
   transform_all(brick, range, out);
 }
 #ifdef VOXKIT_AVX2
-[[gnu::target("avx2")]] void transform_all_avx2(const Brick& brick, BrickRange range, Residuals& out) {
+VOXKIT_AVX2_CODE void transform_all_avx2(const Brick& brick, BrickRange range, Residuals& out) {
   transform_all(brick, range, out);
 }
 const auto transform_all_here = has_avx2() ? transform_all_avx2 : transform_all_generic;

@@ -11,7 +11,7 @@
 
 #include "libvq/rbuc.h"
 
-#define VOXKIT_AVX2_CODE [[gnu::target("avx2"), gnu::always_inline]] inline
+#define VOXKIT_INLINE VOXKIT_AVX2_CODE [[gnu::always_inline]] inline
 
 namespace voxkit::vq {
 namespace {
@@ -66,7 +66,7 @@ constexpr auto faces = [] {
 
 using Vector = __m256i;
 
-VOXKIT_AVX2_CODE Vector unpack(const std::byte* bytes, int width) {
+VOXKIT_INLINE Vector unpack(const std::byte* bytes, int width) {
   const Unpacking& u = unpackings[static_cast<size_t>(width)];
   const Vector words = _mm256_broadcastsi128_si256(_mm_loadu_si128(reinterpret_cast<const __m128i*>(bytes)));
   const Vector spread = _mm256_shuffle_epi8(words, *reinterpret_cast<const Vector*>(u.bytes));
@@ -75,23 +75,23 @@ VOXKIT_AVX2_CODE Vector unpack(const std::byte* bytes, int width) {
 }
 
 /// All ones where a <= b, unsigned.
-VOXKIT_AVX2_CODE Vector at_most(Vector a, Vector b) {
+VOXKIT_INLINE Vector at_most(Vector a, Vector b) {
   return _mm256_cmpeq_epi16(_mm256_subs_epu16(a, b), _mm256_setzero_si256());
 }
 /// Each lane from the row below it in y, zero for y = 0.
-VOXKIT_AVX2_CODE Vector below_y(Vector v) {
+VOXKIT_INLINE Vector below_y(Vector v) {
   return _mm256_slli_epi64(v, 16);
 }
 /// The same in z.
-VOXKIT_AVX2_CODE Vector below_z(Vector v) {
+VOXKIT_INLINE Vector below_z(Vector v) {
   return _mm256_alignr_epi8(v, _mm256_permute2x128_si256(v, v, 0x08), 8);
 }
-VOXKIT_AVX2_CODE Vector slope(int k) {
+VOXKIT_INLINE Vector slope(int k) {
   return *reinterpret_cast<const Vector*>(slopes[static_cast<size_t>(k)].lane);
 }
 
 /// a + b - ab, not below 0 nor above 65535; where `full` 65535 if ab <= a, where `none` 0.
-VOXKIT_AVX2_CODE Vector plane_of(Vector a, Vector b, Vector ab, Vector full, Vector none) {
+VOXKIT_INLINE Vector plane_of(Vector a, Vector b, Vector ab, Vector full, Vector none) {
   const Vector up = _mm256_or_si256(_mm256_subs_epu16(a, ab), full);
   return _mm256_subs_epu16(_mm256_adds_epu16(b, up), _mm256_or_si256(_mm256_subs_epu16(ab, a), none));
 }
@@ -100,7 +100,7 @@ constexpr uint32_t narrow_tops = 1 << 14;
 
 /// a + b modulo top + 1.
 template <bool narrow>
-VOXKIT_AVX2_CODE Vector add_modulo(Vector a, Vector b, Vector top, Vector modulus) {
+VOXKIT_INLINE Vector add_modulo(Vector a, Vector b, Vector top, Vector modulus) {
   // One of both is below modulus, the other one is not, or has wrapped around.
   if constexpr (narrow) {
     return _mm256_min_epu16(_mm256_add_epi16(a, b), _mm256_add_epi16(a, _mm256_sub_epi16(b, modulus)));
@@ -112,7 +112,7 @@ VOXKIT_AVX2_CODE Vector add_modulo(Vector a, Vector b, Vector top, Vector modulu
 /// `unfold_bounded`. With p the prediction, or for odd codes, which count downwards, top - p and the result
 /// likewise: p + (code + 1) / 2 if that is at most top, but where it is less than the code, the code; else
 /// top - code.
-VOXKIT_AVX2_CODE Vector unfold_narrow(Vector code, Vector predicted, Vector top, Vector modulus) {
+VOXKIT_INLINE Vector unfold_narrow(Vector code, Vector predicted, Vector top, Vector modulus) {
   const Vector odd = _mm256_sub_epi16(_mm256_setzero_si256(), _mm256_and_si256(code, _mm256_set1_epi16(1)));
   const Vector turn = _mm256_and_si256(odd, modulus);  // (v ^ odd) + turn: v, or top - v
   const Vector distance = _mm256_add_epi16(_mm256_avg_epu16(code, _mm256_setzero_si256()), turn);
@@ -121,7 +121,7 @@ VOXKIT_AVX2_CODE Vector unfold_narrow(Vector code, Vector predicted, Vector top,
   const Vector voxel = _mm256_min_epu16(near, _mm256_or_si256(_mm256_sub_epi16(top, code), fits));
   return _mm256_add_epi16(_mm256_xor_si256(voxel, odd), turn);
 }
-VOXKIT_AVX2_CODE Vector unfold_wide(Vector code, Vector predicted, Vector top) {
+VOXKIT_INLINE Vector unfold_wide(Vector code, Vector predicted, Vector top) {
   const Vector room = _mm256_sub_epi16(top, predicted), low = at_most(predicted, room);
   const Vector near = _mm256_min_epu16(predicted, room);
   const Vector odd = _mm256_sub_epi16(_mm256_setzero_si256(), _mm256_and_si256(code, _mm256_set1_epi16(1)));
@@ -133,7 +133,7 @@ VOXKIT_AVX2_CODE Vector unfold_wide(Vector code, Vector predicted, Vector top) {
 /// Residuals of columns x = 0 .. 3, of the transforms with medians, become voxels. Rows that have not begun
 /// are 0, as is what lies outside the brick: so are their codes, and their predictions.
 template <bool bounded, bool narrow>
-VOXKIT_AVX2_CODE void invert_medians(Vector* columns, Vector top, Vector modulus) {
+VOXKIT_INLINE void invert_medians(Vector* columns, Vector top, Vector modulus) {
   const Vector zero = _mm256_setzero_si256();
   const Vector no_xz = bounded ? _mm256_setr_epi64x(-1, 0, 0, 0) : zero;                   // z = 0
   const Vector full_yz = bounded ? _mm256_setr_epi64x(-1, 0xffff, 0xffff, 0xffff) : zero;  // or y = 0
@@ -176,7 +176,7 @@ VOXKIT_AVX2_CODE void invert_medians(Vector* columns, Vector top, Vector modulus
 
 /// Of the transform `previous`: sums along z where x = y = 0, then along y where x = 0, then along x.
 template <bool narrow>
-VOXKIT_AVX2_CODE void invert_previous(Vector* columns, Vector top, Vector modulus) {
+VOXKIT_INLINE void invert_previous(Vector* columns, Vector top, Vector modulus) {
   const Vector bottom = _mm256_set1_epi64x(0xffff);
   Vector edge = _mm256_and_si256(columns[0], bottom);
   edge = add_modulo<narrow>(edge, below_z(edge), top, modulus);
@@ -189,7 +189,7 @@ VOXKIT_AVX2_CODE void invert_previous(Vector* columns, Vector top, Vector modulu
 }
 
 /// The upward distances that codes folded modulo stand for.
-VOXKIT_AVX2_CODE Vector upward(Vector code, Vector top) {
+VOXKIT_INLINE Vector upward(Vector code, Vector top) {
   const Vector half = _mm256_srli_epi16(code, 1);
   const Vector odd = _mm256_sub_epi16(_mm256_setzero_si256(), _mm256_and_si256(code, _mm256_set1_epi16(1)));
   return _mm256_blendv_epi8(half, _mm256_sub_epi16(top, half), odd);
@@ -197,7 +197,7 @@ VOXKIT_AVX2_CODE Vector upward(Vector code, Vector top) {
 
 /// Residuals of columns become voxels, less the least one.
 template <bool narrow>
-VOXKIT_AVX2_CODE void invert_columns(Transform transform, Vector* columns, Vector top, Vector modulus) {
+VOXKIT_INLINE void invert_columns(Transform transform, Vector* columns, Vector top, Vector modulus) {
   switch (transform) {
     case Transform::none:
       break;
@@ -213,7 +213,7 @@ VOXKIT_AVX2_CODE void invert_columns(Transform transform, Vector* columns, Vecto
 }
 
 /// Octants as `unpack` makes them become columns.
-VOXKIT_AVX2_CODE void columns_of(const Vector* octants, Vector* columns) {
+VOXKIT_INLINE void columns_of(const Vector* octants, Vector* columns) {
   // Along x in an octant, then across: dwords of two voxels along y.
   const Vector order =
       _mm256_broadcastsi128_si256(_mm_setr_epi8(0, 1, 4, 5, 2, 3, 6, 7, 8, 9, 12, 13, 10, 11, 14, 15));
@@ -229,7 +229,7 @@ VOXKIT_AVX2_CODE void columns_of(const Vector* octants, Vector* columns) {
 }
 
 /// Columns to raster order, `min` added.
-VOXKIT_AVX2_CODE void store_columns(const Vector* columns, Vector min, uint16_t* voxels) {
+VOXKIT_INLINE void store_columns(const Vector* columns, Vector min, uint16_t* voxels) {
   const Vector a = _mm256_add_epi16(columns[0], min), b = _mm256_add_epi16(columns[1], min),
                c = _mm256_add_epi16(columns[2], min), d = _mm256_add_epi16(columns[3], min);
   const Vector even0 = _mm256_unpacklo_epi16(a, b), even1 = _mm256_unpacklo_epi16(c, d);
@@ -245,8 +245,8 @@ VOXKIT_AVX2_CODE void store_columns(const Vector* columns, Vector min, uint16_t*
 
 }  // namespace
 
-[[gnu::target("avx2")]] bool decode_plain_avx2(const std::byte* bytes, int bits, BrickRange range,
-                                               uint16_t* voxels) {
+VOXKIT_AVX2_CODE bool decode_plain_avx2(const std::byte* bytes, int bits, BrickRange range,
+                                        uint16_t* voxels) {
   const Vector min = _mm256_set1_epi16(static_cast<short>(range.min)),
                max = _mm256_set1_epi16(static_cast<short>(range.max));
   Vector outside = _mm256_setzero_si256();
@@ -260,8 +260,8 @@ VOXKIT_AVX2_CODE void store_columns(const Vector* columns, Vector min, uint16_t*
   return _mm256_testz_si256(outside, outside);
 }
 
-[[gnu::target("avx2")]] bool decode_codeword_avx2(const std::byte* codeword, uint32_t available, int bits,
-                                                  BrickRange range, uint16_t* voxels) {
+VOXKIT_AVX2_CODE bool decode_codeword_avx2(const std::byte* codeword, uint32_t available, int bits,
+                                           BrickRange range, uint16_t* voxels) {
   const auto head = static_cast<uint32_t>(codeword[0]);
   if (head == escape)
     return available > static_cast<uint32_t>(plain_bytes(bits)) &&

@@ -15,7 +15,7 @@ namespace portable {
 #ifdef VOXKIT_AVX2
 namespace avx2 {
 
-#define VOXKIT_CODE [[gnu::target("avx2")]]
+#define VOXKIT_CODE VOXKIT_AVX2_CODE
 #include "libcolor/blocks/block_kernel_body.h"
 #undef VOXKIT_CODE
 #undef VOXKIT_INLINE

@@ -116,10 +116,10 @@ VOXKIT_INLINE double multiply_and_add(double factor, double summand) {
 }
 
 #ifdef VOXKIT_AVX2
-[[gnu::target("avx2")]] uint64_t sum_avx2(const Words& words) {
+VOXKIT_AVX2_CODE uint64_t sum_avx2(const Words& words) {
   return sum_streams(words);
 }
-[[gnu::target("avx2")]] double multiply_and_add_avx2(double factor, double summand) {
+VOXKIT_AVX2_CODE double multiply_and_add_avx2(double factor, double summand) {
   return multiply_and_add<Wide>(factor, summand);
 }
 #else
