@@ -94,8 +94,8 @@ extern "C" int LLVMFuzzerTestOneInput(const uint8_t* data, size_t size) {
   if (params.quality == 100 && answer.levels[0] != voxels) stop("quality 100 is not exact");
   if (params.bound == Bound::local) return 0;
   for (size_t i = 0; i < static_cast<size_t>(count); ++i) {
-    const Voxel a = svmm::test::detail::voxel_at(&voxels[i * stride], f),
-                b = svmm::test::detail::voxel_at(&answer.levels[0][i * stride], f);
+    const Voxel a = voxkit::test::voxel_at(&voxels[i * stride], f),
+                b = voxkit::test::voxel_at(&answer.levels[0][i * stride], f);
     const double distance = reference::distance_between(a, b, f, params);
     if (!(distance <= params.delta * params.full_scale))
       stop(fmt::format("voxel {} is {} away: expected at most {}", i, distance,

@@ -25,7 +25,7 @@ std::vector<std::byte> encoded(VolumeSource& source, const Options& options, int
 }
 
 double value_at(const std::byte* p, VoxelFormat format) {
-  const Voxel voxel = vq::test::detail::voxel_at(p, format);
+  const Voxel voxel = voxkit::test::voxel_at(p, format);
   if (format == VoxelFormat::float32) return voxel.as<float>();
   return format == VoxelFormat::density16 ? voxel.as<uint16_t>() : voxel.as<uint8_t>();
 }

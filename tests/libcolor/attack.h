@@ -2,35 +2,15 @@
 // share.
 #pragma once
 
-#include <fmt/format.h>
-
 #include <glm/common.hpp>
-
-#include <memory>
-#include <optional>
-#include <span>
-#include <string>
-#include <vector>
 
 #include "libcolor/color.h"
 #include "libcolor/surface/morton.h"
+#include "tests/attack.h"
 
 namespace voxkit::color::test {
 
-/// How a file was dealt with.
-struct Answer {
-  bool opened = false;
-  bool checked = false;  ///< check() found nothing wrong
-  std::string fault;     ///< what is not acceptable on any input, in words; empty where all is well
-};
-
-inline std::string judge(const Error& error) {
-  if (error.code != ErrorCode::input && error.code != ErrorCode::limit)
-    return fmt::format("error of class {}: {}", static_cast<int>(error.code), error.what);
-  if (error.what.empty() || error.what.find('\n') != std::string::npos)
-    return "a message that is not one line: " + error.what;
-  return {};
-}
+using voxkit::test::Answer;
 
 /// A box, in one go and voxel by voxel.
 inline std::string ask_box(const Volume& volume, const Box& box) {
@@ -38,7 +18,7 @@ inline std::string ask_box(const Volume& volume, const Box& box) {
   std::vector<std::byte> voxels(static_cast<size_t>(box.voxels()) * 4, std::byte{0xa5});
   const VoxelSpan span = packed(voxels.data(), size, VoxelFormat::rgba32);
   const Status status = volume.decode(box, span);
-  if (!status) return judge(status.error());
+  if (!status) return voxkit::test::judge(status.error());
   for (int64_t z = 0; z < size.z; z += 1 + size.z / 5)
     for (int64_t y = 0; y < size.y; y += 1 + size.y / 5)
       for (int64_t x = 0; x < size.x; x += 1 + size.x / 5) {
@@ -47,7 +27,7 @@ inline std::string ask_box(const Volume& volume, const Box& box) {
         const Index3 at = box.lo + Index3(x, y, z);
         const auto voxel = volume.voxel(at);
         if (!voxel) {
-          if (auto fault = judge(voxel.error()); !fault.empty()) return fault;
+          if (auto fault = voxkit::test::judge(voxel.error()); !fault.empty()) return fault;
           continue;
         }
         if (voxel->has_value() != (p[3] != std::byte{0})) return "a voxel that the box has not, or has alone";
@@ -56,42 +36,17 @@ inline std::string ask_box(const Volume& volume, const Box& box) {
   return {};
 }
 
-inline Answer attack(std::span<const std::byte> file) {
-  // Exactly its bytes on the heap: a sanitizer sees any read past the end.
-  const auto bytes = std::make_shared<const std::vector<std::byte>>(file.begin(), file.end());
-  Answer answer;
-  const auto container = Container::open(*bytes, "hostile", bytes);
-  if (!container) {
-    answer.fault = judge(container.error());
-    return answer;
-  }
-  MemoryBudget decoded(uint64_t{256} << 20);
-  const auto opened = Volume::open(*container, &decoded);
-  if (!opened) {
-    answer.fault = judge(opened.error());
-    return answer;
-  }
-  answer.opened = true;
-  const Volume& volume = **opened;
-  MemoryBudget memory(uint64_t{256} << 20);
-  Context ctx;
-  ctx.memory = &memory;
-  const Status checked = volume.check(ctx);
-  answer.checked = checked.has_value();
-  if (!checked) answer.fault = judge(checked.error());
-  if (answer.fault.empty() && !memory.reserve(memory.limit(), "all of it"))
-    answer.fault = "reserved memory was kept";
-  if (!answer.fault.empty()) return answer;
-
+/// Some boxes, some colours, and all voxels in their order.
+inline void ask(const Volume& volume, Answer& answer, Context& ctx) {
   const Index3 dims = volume.info().dims, size = glm::min(dims, Index3(48));
   for (const Index3 corner : {Index3(0), dims - size, (dims - size) / Index3(2)}) {
     answer.fault = ask_box(volume, {corner, corner + size});
-    if (!answer.fault.empty()) return answer;
+    if (!answer.fault.empty()) return;
   }
   for (const uint64_t index : {uint64_t{0}, volume.params().color_count / 2, volume.params().color_count - 1})
     if (index < volume.params().color_count)
       if (const auto color = volume.color(index); !color && answer.fault.empty())
-        answer.fault = judge(color.error());
+        answer.fault = voxkit::test::judge(color.error());
   // All voxels, as long as there are not too many.
   uint64_t count = 0, next = 0;
   bool ordered = true;
@@ -106,10 +61,17 @@ inline Answer attack(std::span<const std::byte> file) {
       },
       ctx);
   if (!ordered) answer.fault = "voxels out of order";
-  if (!walked && answer.fault.empty()) answer.fault = judge(walked.error());
+  if (!walked && answer.fault.empty()) answer.fault = voxkit::test::judge(walked.error());
   if (!walked && answer.checked && walked.error().code != ErrorCode::limit)
     answer.fault = "check() finds nothing wrong, but voxels cannot be read: " + walked.error().what;
-  return answer;
+}
+
+inline Answer attack(std::span<const std::byte> file) {
+  MemoryBudget decoded(uint64_t{256} << 20);
+  const auto open = [&](const std::shared_ptr<const Container>& container) {
+    return Volume::open(container, &decoded);
+  };
+  return voxkit::test::attack_with<Answer>(file, open, ask);
 }
 
 }  // namespace voxkit::color::test

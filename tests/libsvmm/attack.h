@@ -1,134 +1,48 @@
 // All that can be asked of an SVMM file, asked of any bytes: what hostile_test.cc and the fuzz targets share.
 #pragma once
 
-#include <fmt/format.h>
-
-#include <memory>
-#include <optional>
-#include <span>
-#include <string>
-#include <vector>
-
 #include "libsvmm/svmm.h"
+#include "tests/attack.h"
 
 namespace voxkit::svmm::test {
 
-/// How a file was dealt with.
-struct Answer {
-  bool opened = false;
-  bool checked = false;                        ///< check() found nothing wrong
+struct Answer : voxkit::test::Answer {
   std::vector<std::vector<std::byte>> levels;  ///< decoded in full, if all could be
-  std::string fault;  ///< what is not acceptable on any input, in words; empty where all is well
 };
 
-namespace detail {
-
-inline std::string judge(const Error& error) {
-  if (error.code != ErrorCode::input && error.code != ErrorCode::limit && error.code != ErrorCode::usage)
-    return fmt::format("error of class {}: {}", static_cast<int>(error.code), error.what);
-  if (error.what.empty() || error.what.find('\n') != std::string::npos)
-    return "a message that is not one line: " + error.what;
-  return {};
-}
-
-inline Voxel voxel_at(const std::byte* bytes, VoxelFormat format) {
-  Voxel v;
-  std::memcpy(v.bytes.data(), bytes, static_cast<size_t>(voxel_bytes(format)));
-  return v;
-}
-
-/// Decodes a box into a buffer of exactly its size and asks for some of it in the other ways: a single voxel
-/// and uniform regions must agree with the box.
-inline std::string ask_box(const Volume& volume, int level, const Box& box,
-                           std::optional<std::vector<std::byte>>& out) {
-  const VoxelFormat format = volume.info().format;
-  const auto stride = static_cast<size_t>(voxel_bytes(format));
-  const Index3 size = box.size();
-  std::vector<std::byte> voxels(static_cast<size_t>(box.voxels()) * stride, std::byte{0xa5});
-  const Status status = volume.decode(box, level, packed(voxels.data(), size, format));
-  const auto decoded = [&](Index3 v) {
-    return voxel_at(&voxels[static_cast<size_t>((v.z * size.y + v.y) * size.x + v.x) * stride], format);
-  };
-  if (format == VoxelFormat::bitmap && status)
-    for (std::byte b : voxels)
-      if (b > std::byte{1}) return "a bit that is neither 0 nor 1";
-  for (const Index3 v : {Index3(0), size / Index3(2), size - Index3(1), Index3(size.x - 1, size.y / 2, 0)}) {
-    const auto sample = volume.sample(box.lo + v, level);
-    if (!sample) {
-      if (status) return "a voxel of a box that can be decoded cannot: " + sample.error().what;
-      if (auto fault = judge(sample.error()); !fault.empty()) return fault;
-    } else if (status && *sample != decoded(v)) {
-      return fmt::format("level {}: voxel {},{},{} is not what the box has", level, v.x, v.y, v.z);
-    }
-    // The largest regions from this voxel on that the file says are uniform.
-    for (int64_t edge = 1; edge <= 8; edge *= 2) {
-      const Box part = intersect({v, v + Index3(edge)}, {Index3(0), size});
-      const auto value = volume.uniform({box.lo + part.lo, box.lo + part.hi}, level);
-      if (!value || !status) continue;
-      for (int64_t z = part.lo.z; z < part.hi.z; ++z)
-        for (int64_t y = part.lo.y; y < part.hi.y; ++y)
-          for (int64_t x = part.lo.x; x < part.hi.x; ++x)
-            if (decoded({x, y, z}) != *value) return fmt::format("level {}: uniform() is wrong", level);
-    }
-  }
-  (void)volume.uniform(box, level);
-  if (!status) return judge(status.error());
-  out = std::move(voxels);
-  return {};
-}
-
-}  // namespace detail
-
-/// Volumes up to this many voxels are decoded in full, of larger ones the corners.
-inline constexpr uint64_t whole_voxels = uint64_t{1} << 22;
-
-inline Answer attack(std::span<const std::byte> file) {
-  // Exactly its bytes on the heap: a sanitizer sees any read past the end.
-  const auto bytes = std::make_shared<const std::vector<std::byte>>(file.begin(), file.end());
-  Answer answer;
-  const auto container = Container::open(*bytes, "hostile", bytes);
-  if (!container) {
-    answer.fault = detail::judge(container.error());
-    return answer;
-  }
-  const auto opened = Volume::open(*container);
-  if (!opened) {
-    answer.fault = detail::judge(opened.error());
-    return answer;
-  }
-  answer.opened = true;
-  const Volume& volume = **opened;
-  MemoryBudget memory(uint64_t{256} << 20);
-  Context ctx;
-  ctx.memory = &memory;
-  const Status checked = volume.check(ctx);
-  answer.checked = checked.has_value();
-  if (!checked) answer.fault = detail::judge(checked.error());
-
+/// A level, or corners of it; whether it was decoded in full.
+inline bool ask_level(const Volume& volume, int level, Answer& answer) {
   bool whole = true;
-  for (int level = 0; level < static_cast<int>(volume.levels().size()) && answer.fault.empty(); ++level) {
-    const Index3 dims = volume.dims_at(level);
-    const auto voxels = checked_voxels(dims);
-    if (!voxels) {
-      answer.fault = fmt::format("level {} of {} x {} x {}", level, dims.x, dims.y, dims.z);
-      return answer;
-    }
+  for (const Box& box : voxkit::test::boxes_of(volume.dims_at(level))) {
     std::optional<std::vector<std::byte>> decoded;
-    if (*voxels <= whole_voxels) {
-      answer.fault = detail::ask_box(volume, level, {Index3(0), dims}, decoded);
-      if (decoded) answer.levels.push_back(std::move(*decoded));
-    } else {
-      const Index3 size{std::min<int64_t>(dims.x, 33), std::min<int64_t>(dims.y, 33),
-                        std::min<int64_t>(dims.z, 33)};
-      whole = false;
-      answer.fault = detail::ask_box(volume, level, {Index3(0), size}, decoded);
-      if (answer.fault.empty()) answer.fault = detail::ask_box(volume, level, {dims - size, dims}, decoded);
-    }
+    const auto fault = voxkit::test::ask_box(
+        volume.info().format, box, decoded,
+        [&](const Box& part, VoxelSpan out) { return volume.decode(part, level, out); },
+        [&](Index3 voxel) { return volume.sample(voxel, level); },
+        [&](const Box& part) { return volume.uniform(part, level); });
+    if (!fault.empty()) answer.fault = fmt::format("level {}: {}", level, fault);
     if (answer.fault.empty() && answer.checked && !decoded)
       answer.fault = fmt::format("check() finds nothing wrong, but level {} cannot be decoded", level);
+    if (!answer.fault.empty()) return false;
+    whole = decoded && box.size() == volume.dims_at(level);
+    if (whole) answer.levels.push_back(std::move(*decoded));
   }
-  if (!whole || answer.levels.size() != volume.levels().size()) answer.levels.clear();
-  return answer;
+  return whole;
+}
+
+inline Answer attack(std::span<const std::byte> file) {
+  const auto open = [](const std::shared_ptr<const Container>& container) { return Volume::open(container); };
+  return voxkit::test::attack_with<Answer>(file, open, [](const Volume& volume, Answer& answer, Context&) {
+    bool whole = true;
+    for (int level = 0; level < static_cast<int>(volume.levels().size()) && answer.fault.empty(); ++level) {
+      const Index3 dims = volume.dims_at(level);
+      if (checked_voxels(dims))
+        whole &= ask_level(volume, level, answer);
+      else
+        answer.fault = fmt::format("level {} of {} x {} x {}", level, dims.x, dims.y, dims.z);
+    }
+    if (!whole) answer.levels.clear();
+  });
 }
 
 }  // namespace voxkit::svmm::test
