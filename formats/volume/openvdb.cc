@@ -21,6 +21,21 @@
 #include "formats/volume/openvdb_tree.h"
 #include "formats/volume/volume_module.h"
 
+#ifdef VOXKIT_OPENVDB_INSTANTIATED
+// The library has these, and compiling them once more takes longer than all of this file.
+namespace openvdb {
+OPENVDB_USE_VERSION_NAMESPACE
+namespace OPENVDB_VERSION_NAME {
+extern template class Grid<FloatTree>;
+extern template class Grid<Vec3STree>;
+namespace tree {
+extern template class Tree<FloatTree::RootNodeType>;
+extern template class Tree<Vec3STree::RootNodeType>;
+}  // namespace tree
+}  // namespace OPENVDB_VERSION_NAME
+}  // namespace openvdb
+#endif
+
 namespace voxkit {
 namespace {
 
