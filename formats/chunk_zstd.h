@@ -19,9 +19,9 @@ class ChunkPacker {
  public:
   /// `level`: 1 (fast) to most_zstd_level (small). Its memory is counted.
   ChunkPacker(int level, MemoryBudget& memory);
-  /// The chunk as one frame, valid until the next call; empty if there is little to win from having to expand
-  /// it: if it has less than 4096 bytes, or the frame is not smaller by a sixteenth. ErrorCode::limit if
-  /// there is no memory for it.
+  /// Compresses a chunk to one frame, valid until the next call; empty if there is little to win from having
+  /// to expand it: if it has less than 4096 bytes, or the frame is not smaller by a sixteenth. Errors:
+  /// ErrorCode::limit if there is no memory for it.
   Result<std::span<const std::byte>> pack(std::span<const std::byte> chunk);
 
  private:

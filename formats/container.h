@@ -54,8 +54,9 @@ class ContainerWriter {
   /// `version`: at least that of the container. Chunks are compressed with zstd where that is worth it;
   /// `zstd`: its level, 0: none is.
   ContainerWriter(ByteSink sink, Codec codec, uint16_t version, int zstd, MemoryBudget& memory);
+  /// Appends a chunk. Errors: those of the sink; ErrorCode::limit if there is no memory to compress it.
   Status add(uint32_t kind, uint32_t index, uint64_t part, std::span<const std::byte> bytes);
-  /// Writes the table and the trailer. Nothing may follow.
+  /// Writes the table and the trailer. Nothing may follow. Errors: those of the sink.
   Status finish();
   uint64_t bytes_written() const { return position_; }
 
@@ -77,8 +78,9 @@ class ContainerWriter {
 /// compressed, when it is first asked for.
 class Container {
  public:
-  /// `keep_alive` owns `bytes`. `name` is for messages. Expanded chunks are counted in `memory`, which
-  /// outlives the container; without one they are not.
+  /// Opens the container that is in `bytes`, which `keep_alive` owns. `name` is for messages. Expanded chunks
+  /// are counted in `memory`, which outlives the container; without one they are not. Errors:
+  /// ErrorCode::input, naming the section, its offset and the rule that is broken.
   static Result<std::shared_ptr<const Container>> open(std::span<const std::byte> bytes, std::string name,
                                                        std::shared_ptr<const void> keep_alive,
                                                        MemoryBudget* memory = nullptr);

@@ -36,7 +36,7 @@ struct Context {
 
 /// Set by the signal handlers of the tools; long loops return ErrorCode::interrupted when it is non-zero.
 extern std::atomic<int> interrupt_signal;
-/// An error once a signal asked us to stop.
+/// Tells whether to go on. Errors: ErrorCode::interrupted once a signal asked us to stop.
 Status check_interrupt();
 
 }  // namespace voxkit

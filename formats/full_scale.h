@@ -9,9 +9,10 @@
 
 namespace voxkit {
 
-/// 255 for DENSITY8 and colours, 1 for BITMAP. DENSITY16: 2^b - 1 with the b bits (at least 1) that `range`,
-/// extended to the sample value 0, needs: scanners store 12 bits in 16. FLOAT32: the extent of the range, 1
-/// where that is 0. `range`: stored values of the volume (unused for the other formats).
+/// The peak of a volume: 255 for DENSITY8 and colours, 1 for BITMAP. DENSITY16: 2^b - 1 with the b bits (at
+/// least 1) that `range`, extended to the sample value 0, needs: scanners store 12 bits in 16. FLOAT32: the
+/// extent of the range, 1 where that is 0. `range`: stored values of the volume (unused for the other
+/// formats).
 inline double full_scale(const VolumeInfo& info, const ValueRange& range) {
   switch (info.format) {
     case VoxelFormat::bitmap:

@@ -12,11 +12,12 @@
 
 namespace voxkit {
 
+/// Bytes that can be read once, front to back.
 class InputStream {
  public:
   virtual ~InputStream() = default;
-  /// Reads up to out.size() bytes; fewer only at the end of the data. An error of the system or of the coding
-  /// (corrupt gzip, say) is ErrorCode::input.
+  /// Reads up to out.size() bytes and returns how many; fewer only at the end of the data. Errors:
+  /// ErrorCode::input, of the system or of the coding (corrupt gzip, say).
   virtual Result<size_t> read(std::span<std::byte> out) = 0;
 
   /// Reads exactly out.size() bytes, or fails with "ends after N bytes: expected …".
@@ -36,7 +37,7 @@ class InputStream {
   uint64_t position_ = 0;  ///< bytes delivered so far; kept by implementations
 };
 
-/// "-" is standard input.
+/// Opens a file; "-" is standard input. Errors: ErrorCode::input.
 Result<std::unique_ptr<InputStream>> open_stream(const std::string& path);
 /// Decompress on the fly; concatenated members are followed, trailing zeros allowed. The memory used does not
 /// depend on the data.

@@ -11,11 +11,13 @@
 
 namespace voxkit {
 
+/// The bytes of a file as they are read, page by page, for as long as it lives.
 class MappedFile {
  public:
-  /// Maps a regular file.
+  /// Maps a regular file. Errors: ErrorCode::input.
   static Result<std::shared_ptr<const MappedFile>> open(const std::string& path);
   /// Copies a stream (a pipe, say) to an unlinked temporary file in $TMPDIR (default /tmp) and maps that.
+  /// Errors: those of the stream; ErrorCode::output where there is no room.
   static Result<std::shared_ptr<const MappedFile>> spool(InputStream& stream);
   ~MappedFile();
   MappedFile(const MappedFile&) = delete;

@@ -19,9 +19,10 @@ struct NumberedName {
   std::string prefix, suffix;
   int width = 1;  ///< least number of digits
 
+  /// The last part of the name of a file, and all of it.
   std::string name(uint64_t number) const;
   std::string path(uint64_t number) const { return folder + name(number); }
-  /// The number in a file name that this pattern makes.
+  /// The number in the last part of a name that this pattern makes; nothing in any other name.
   std::optional<uint64_t> number(const std::string& file) const;
 };
 
@@ -30,8 +31,7 @@ struct NumberedName {
 bool is_numbered(std::string_view name);
 
 /// Takes a name that is_numbered apart; there %% stands for %. Errors: ErrorCode::usage where there is any
-/// other
-/// %, a second %d, a width without its 0, or one above 18.
+/// other %, a second %d, a width without its 0, or one above 18.
 Result<NumberedName> numbered_name(const std::string& name);
 
 }  // namespace voxkit

@@ -23,6 +23,7 @@ class OutputFile {
   OutputFile(const OutputFile&) = delete;
   OutputFile& operator=(const OutputFile&) = delete;
 
+  /// Appends. Errors: ErrorCode::output.
   Status write(std::span<const std::byte> bytes);
   Status write(const std::string& text);
   /// Bytes written so far.
@@ -30,7 +31,8 @@ class OutputFile {
   const std::string& name() const { return name_; }
   /// Path of the temporary file (for libraries that insist on writing by name); empty for "-".
   const std::string& temporary() const { return temporary_; }
-  /// Flushes to disk and gives the file its final name.
+  /// Flushes to disk and gives the file its final name. Errors: ErrorCode::output; without `force` also where
+  /// such a file has come into being in the meantime.
   Status commit();
 
  private:

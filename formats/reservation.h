@@ -8,12 +8,12 @@
 
 namespace voxkit {
 
-/// Bytes of a budget, which must outlive it; given back at the end. Moves, does not copy.
+/// Holds bytes of a budget, which must outlive it, and gives them back at its end. Moves, does not copy.
 class Reservation {
  public:
   Reservation() = default;
   explicit Reservation(MemoryBudget& budget) : budget_(&budget) {}
-  /// Fails with ErrorCode::limit, naming `what`.
+  /// Reserves `bytes` of ctx.memory for `what`, which the message names. Errors: ErrorCode::limit.
   static Result<Reservation> take(uint64_t bytes, const std::string& what, const Context& ctx) {
     Reservation reservation(*ctx.memory);
     VOX_CHECK(reservation.add(bytes, what));
@@ -29,12 +29,14 @@ class Reservation {
     std::swap(bytes_, other.bytes_);
     return *this;
   }
-  /// More of the same; not of one without a budget. Fails with ErrorCode::limit, naming `what`.
+  /// Reserves `bytes` more, of the same budget, which it must have. Errors: ErrorCode::limit, and then it
+  /// holds what it held.
   Status add(uint64_t bytes, const std::string& what) {
     VOX_CHECK(budget_->reserve(bytes, what));
     bytes_ += bytes;
     return {};
   }
+  /// Gives back some of the bytes that it holds.
   void release(uint64_t bytes) {
     budget_->release(bytes);
     bytes_ -= bytes;

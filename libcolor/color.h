@@ -25,12 +25,20 @@ struct Report {
          build_seconds = 0;  ///< of colours; of everything else, reading the source included
 };
 
-/// Whether the options go together: ErrorCode::usage says which do not.
+/// Checks whether the options are within their ranges and this build has their codec. Errors:
+/// ErrorCode::usage, saying which is not, or naming the package that is missing.
 Status validate(const Options& options);
 
 /// Compresses `source` into a container written to `sink`, in one pass. Memory: the DAG and some parts of
 /// colours; with Colors::all or along a Hilbert curve, all colours, twice; with palette, all colours. What is
-/// written does not depend on ctx.threads.
+/// written does not depend on ctx.threads. Errors:
+/// - ErrorCode::usage: those of `validate`.
+/// - ErrorCode::limit: more than 2^32 - 1 different leaf words, or words of the nodes of a height; as many
+///   colours with Counts::pointer; more memory than ctx.memory allows.
+/// - ErrorCode::interrupted: a signal came.
+/// - ErrorCode::internal: a source that is no surface, or not in Morton order; a library that cannot encode
+///   an image.
+/// - Those of `source` and of `sink`, as they are.
 Result<Report> encode(SurfaceSource& source, const Options& options, const ByteSink& sink, Context& ctx);
 /// The bytes of a part of so many colours as the codec stores them, where they are known; its colours in the
 /// source are then those that they stand for. Called from any thread.

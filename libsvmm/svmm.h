@@ -65,9 +65,11 @@ struct Params {
   int zstd = 0;  ///< level of zstd for the file's chunks, 1 to 19; 0: as they are. Of the encoder alone
 };
 
-/// delta of a quality q. plain: sqrt(n) (1 - q/100) over the format's n attributes; thesis: 1 - q/100.
+/// The delta that a quality q of 0..100 stands for. plain: sqrt(n) (1 - q/100) over the format's n
+/// attributes; thesis: 1 - q/100.
 double delta_of_quality(double quality, VoxelFormat format, Layout layout);
-/// Whether the parameters go together and with a volume; ErrorCode::usage says which do not.
+/// Checks whether the parameters go together and with a volume. Errors: ErrorCode::usage, saying which do
+/// not.
 Status validate(const Params& params, const VolumeInfo& info);
 
 /// One mip-map level; 0 is the base, the last one the root.
@@ -87,8 +89,12 @@ uint64_t thesis_bytes(std::span<const Level> levels);
 
 /// Compresses `source` into a container written to `sink`, in one pass over the source. Memory: a few slabs
 /// of max(32, 2 w_0) slices if the source is forward only, else a few tiles of that width; plus a slab of
-/// each higher level. The bytes written do not depend on ctx.threads. Returns the levels. ErrorCode::limit:
-/// more than `most_voxels`, or than ctx.memory allows.
+/// each higher level. The bytes written do not depend on ctx.threads. Returns the levels. Errors:
+/// - ErrorCode::usage: those of `validate`.
+/// - ErrorCode::limit: more than `most_voxels`; more than 2^32 blocks in a level of Layout::thesis; more
+///   memory than ctx.memory allows.
+/// - ErrorCode::interrupted: a signal came.
+/// - Those of `source` and of `sink`, as they are.
 Result<std::vector<Level>> encode(VolumeSource& source, const Params& params, const ByteSink& sink,
                                   Context& ctx);
 

@@ -89,19 +89,26 @@ struct Report {
   double seeding_seconds = 0, kmeans_seconds = 0;
 };
 
-/// Whether the options go together and with a volume: ErrorCode::usage says which do not, ErrorCode::input
-/// that colours are not supported.
+/// Checks whether the options go together and with a volume. Errors: ErrorCode::usage, saying which do not;
+/// ErrorCode::input: colours are not supported.
 Status validate(const Options& options, const VolumeInfo& info);
 
-/// The greatest error that encoding a finite voxel with these options may make, before k-means: 0 for
-/// integers without `max_error`. ErrorCode::usage where 16 bits do not suffice for what is asked.
+/// The greatest error, in sample values, that encoding a finite voxel with these options may make, before
+/// k-means: 0 for integers without `max_error`. Errors: ErrorCode::usage where 16 bits do not suffice for
+/// what is asked.
 Result<double> error_bound(const Options& options, const VolumeInfo& info);
 
 /// Compresses `source` into a container written to `sink`, in one pass over the source. Of a FLOAT32 volume
 /// minus infinity is encoded as the least value, plus infinity as the greatest, and not a number, without
 /// `keep_nan`, as the least. The fill value of an integer volume (VolumeInfo::fill) is exact with any
 /// `max_error`. Memory: the codebook, compressed, and 4 bytes for each brick; with k-means, what that takes
-/// for the unique bricks as well. What is written does not depend on ctx.threads.
+/// for the unique bricks as well. What is written does not depend on ctx.threads. Errors:
+/// - ErrorCode::usage: those of `validate` and of `error_bound`.
+/// - ErrorCode::input: colours.
+/// - ErrorCode::limit: more than most_codewords different bricks; a codebook of over 4 GiB with
+///   Mapping::direct; more memory than ctx.memory allows.
+/// - ErrorCode::interrupted: a signal came.
+/// - Those of `source` and of `sink`, as they are.
 Result<Report> encode(VolumeSource& source, const Options& options, const ByteSink& sink, Context& ctx);
 
 /// A FLOAT32 volume as `encode` takes it, for comparing: minus infinity is range.lo, plus infinity range.hi,
