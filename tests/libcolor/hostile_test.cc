@@ -89,5 +89,59 @@ TEST(ColorHostile, ResealedDamageIsAnsweredSoundly) {
   EXPECT_GT(refused_late, 1000);
 }
 
+/// Counts that do not add up would give voxels the colors of others: whoever opens or walks such a file finds
+/// out.
+TEST(ColorHostile, CountsThatDoNotAddUpAreFoundWithoutACheck) {
+  Context ctx;
+  MemoryBudget budget;
+  ctx.memory = &budget;
+  Options options;
+  options.codec = ColorCodec::raw;
+  ListSource shell(sphere_shell(5), Index3(32));
+  const Bytes whole = compressed(shell, options);
+  const auto table = voxkit::test::table_of(whole);
+  int changed = 0;
+  for (size_t i = 0; i < table.entries; ++i) {
+    const std::byte* const entry = &whole[table.offset + 64 * i];
+    if (load_le<uint32_t>(entry) != chunk_kind("NODE")) continue;
+    const auto offset = load_le<uint64_t>(entry + 16);
+    if (load_le<uint64_t>(entry + 24) == 0) continue;
+    Bytes file = whole;
+    const auto word = load_le<uint32_t>(&file[offset]);
+    store_le(&file[offset], word - (1u << 8));  // the first node's count, less one
+    voxkit::test::reseal(file);
+    ++changed;
+    const auto container = Container::open(file, "test", nullptr);
+    ASSERT_TRUE(container);
+    const auto volume = Volume::open(*container);
+    ASSERT_TRUE(volume);
+    EXPECT_FALSE((*volume)->check(ctx));
+    const auto walked =
+        (*volume)->for_each_voxel([](std::span<const SurfaceVoxel>) -> Status { return {}; }, ctx);
+    ASSERT_FALSE(walked) << "chunk " << i;
+    EXPECT_EQ(walked.error().code, ErrorCode::input);
+  }
+  EXPECT_GE(changed, 2);
+}
+
+TEST(ColorHostile, DamagedBlocksAreFoundWithoutACheck) {
+  Options options;
+  options.codec = ColorCodec::vws;
+  ListSource shell(sphere_shell(5), Index3(32));
+  Bytes file = compressed(shell, options);
+  const auto table = voxkit::test::table_of(file);
+  for (size_t i = 0; i < table.entries; ++i) {
+    const std::byte* const entry = &file[table.offset + 64 * i];
+    if (load_le<uint32_t>(entry) == chunk_kind("COLR"))
+      store_le(&file[load_le<uint64_t>(entry + 16)], ~uint32_t{0});  // the number of its blocks
+  }
+  voxkit::test::reseal(file);
+  const auto container = Container::open(file, "test", nullptr);
+  ASSERT_TRUE(container);
+  const auto volume = Volume::open(*container);
+  ASSERT_TRUE(volume);
+  EXPECT_FALSE((*volume)->color(0));
+}
+
 }  // namespace
 }  // namespace voxkit::color
