@@ -17,6 +17,10 @@ struct PixelDetail {
   int32_t voxel[3] = {-1, -1, -1};  ///< the first that is not void; of a coarser cell the one entered
   uint32_t cells = 0;               ///< cells looked at
 };
+/// What it cost, beside its cells: blocks entered, bytes of links and values looked at.
+struct PixelCost {
+  uint32_t blocks, bytes;
+};
 
 struct Colour {
   float rgb[3], alpha;

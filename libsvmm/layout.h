@@ -13,6 +13,16 @@ namespace voxkit::svmm {
 inline constexpr uint32_t params_kind = chunk_kind("SVMP");
 inline constexpr uint32_t blocks_kind = chunk_kind("BLKS");
 
+/// load_le from where a T may lie: devices load it as one word then, not byte by byte.
+template <class T>
+VOX_HD T load_aligned_le(const std::byte* p) {
+#ifdef __CUDA_ARCH__
+  return *reinterpret_cast<const T*>(p);
+#else
+  return load_le<T>(p);
+#endif
+}
+
 /// A subblock is 2^3 voxels; voxel i = 4z + 2y + x (section 2.2.2). Of a block of `size` voxels (all even)
 /// the subblocks follow in raster order, x fastest, 8 voxels each.
 constexpr int64_t subblock_index(Index3 v, Index3 size) {
@@ -83,14 +93,28 @@ VOX_HD inline Voxel thesis_value(uint32_t word, VoxelFormat f) {
   return v;
 }
 VOX_HD inline uint32_t load_word(const std::byte* p, VoxelFormat f) {
-  return is_colour(f) ? load_le<uint32_t>(p) : load_le<uint16_t>(p);
+  return is_colour(f) ? load_aligned_le<uint32_t>(p) : load_aligned_le<uint16_t>(p);
 }
 inline void store_word(std::byte* p, VoxelFormat f, uint32_t word) {
   is_colour(f) ? store_le(p, word) : store_le(p, static_cast<uint16_t>(word));
 }
 
+/// Bytes of the values of a subblock, layout plain; the links of a block follow those of all.
+constexpr int subblock_bytes(VoxelFormat f) {
+  return 8 * value_bytes(f);
+}
+// Values, links and words lie at multiples of their size within a block, and so do blocks that follow each
+// other from such a place on.
+static_assert([] {
+  for (const VoxelFormat f : {VoxelFormat::rgba32, VoxelFormat::rgb24, VoxelFormat::density8,
+                              VoxelFormat::density16, VoxelFormat::float32, VoxelFormat::bitmap})
+    if (subblock_bytes(f) % static_cast<int>(sizeof(uint64_t)) != 0 || 8 * word_bytes(f) % 8 != 0)
+      return false;
+  return true;
+}());
+
 /// A block above the base level, or a root, of `size` voxels. Its bytes must be at least
-/// `structural_block_bytes`.
+/// `structural_block_bytes`; they begin at a multiple of 8, where a device is to read them.
 struct StructuralBlock {
   const std::byte* bytes;
   Index3 size;
@@ -99,7 +123,7 @@ struct StructuralBlock {
 
   VOX_HD int64_t subblocks() const { return size.x * size.y * size.z / 8; }
   VOX_HD Link link(int64_t subblock) const {
-    if (layout == Layout::plain) return unpack_link(load_le<uint64_t>(links() + subblock * 8));
+    if (layout == Layout::plain) return unpack_link(load_aligned_le<uint64_t>(links() + subblock * 8));
     Link link;
     for (int i = 0; i < 8; ++i) {
       const uint32_t word = load_word(bytes + (subblock * 8 + i) * word_bytes(format), format);
@@ -118,7 +142,7 @@ struct StructuralBlock {
   }
 
  private:
-  VOX_HD const std::byte* links() const { return bytes + subblocks() * 8 * value_bytes(format); }
+  VOX_HD const std::byte* links() const { return bytes + subblocks() * subblock_bytes(format); }
 };
 uint64_t structural_block_bytes(uint64_t voxels, VoxelFormat f, Layout layout);
 

@@ -10,16 +10,15 @@
 namespace voxkit::svmm {
 
 /// Finds the voxels of a volume one after the other, and remembers the blocks between the root and where it
-/// is: the next search begins at the smallest of them that holds the voxel. `Pools` tells where blocks are:
-/// `const std::byte* block(int level, uint64_t number)`, null if there is no such block.
-template <class Pools>
+/// is: the next search begins at the smallest of them that holds the voxel; or, without a path, at the root,
+/// and then nothing is kept by level. `Pools` tells where blocks are: `const std::byte* block(int level,
+/// uint64_t number)`, null if there is no such block.
+template <class Pools, bool with_path = true>
 class Walk {
  public:
   VOX_HD_HOT Walk(const View& view, const Pools& pools) : view_(&view), pools_(&pools), level_(view.root) {
-    blocks_[level_] = pools.block(level_, 0);
+    blocks_[root_slot()] = pools.block(level_, 0);
   }
-  /// Forgets all but the root.
-  VOX_HD_HOT void restart() { level_ = view_->root; }
 
   struct Found {
     Voxel value;    ///< as decoded
@@ -29,10 +28,13 @@ class Walk {
   /// edge is at most 2^finest (-1: all detail). Eight terminal voxels of a subblock that have one value are
   /// one cell. Void, as large as the volume, if a block is missing.
   VOX_HD_HOT Found locate(uint32_t x, uint32_t y, uint32_t z, int finest) {
-    climb(x, y, z, finest);
+    if constexpr (with_path)
+      climb(x, y, z, finest);
+    else
+      level_ = view_->root;
+    const std::byte* block = blocks_[with_path ? level_ : root_slot()];
     for (;;) {
       const LevelView& level = view_->levels[level_];
-      const std::byte* block = blocks_[level_];
       if (block == nullptr) return {{}, view_->log2_side};
       bytes_ += level.lookup_bytes;
       const int64_t vx = x >> level.shift & level.within, vy = y >> level.shift & level.within,
@@ -50,7 +52,8 @@ class Walk {
       if (level.shift <= finest) return {decoded_value(value, view_->format), level.shift};
       --level_;
       parent_ = value;
-      blocks_[level_] = pools_->block(level_, link.child(i));
+      block = pools_->block(level_, link.child(i));
+      if constexpr (with_path) blocks_[level_] = block;
       ++entered_;
     }
   }
@@ -59,6 +62,7 @@ class Walk {
   VOX_HD_HOT uint32_t bytes_read() const { return bytes_; }
 
  private:
+  VOX_HD_HOT int root_slot() const { return with_path ? view_->root : 0; }
   /// Up to the first block that holds the voxel and whose own equivalent voxel is not fine enough already.
   VOX_HD_HOT void climb(uint32_t x, uint32_t y, uint32_t z, int finest) {
     const uint32_t apart = (x ^ at_[0]) | (y ^ at_[1]) | (z ^ at_[2]);
@@ -73,7 +77,7 @@ class Walk {
     const LevelView& level = view_->levels[0];
     if (view_->base == Base::raw && view_->layout == Layout::plain && view_->format == VoxelFormat::rgba32) {
       const std::byte* p = block + subblock * 32;
-      const Voxel value = Voxel::of(load_le<uint32_t>(p + 4 * i));
+      const Voxel value = Voxel::of(load_aligned_le<uint32_t>(p + 4 * i));
       return {value, level.within != 1 && same_words(p, value) ? 1 : 0};
     }
     const Voxel value =
@@ -88,14 +92,14 @@ class Walk {
   /// Eight 32-bit values.
   VOX_HD_HOT static bool same_words(const std::byte* p, const Voxel& value) {
     const uint64_t pair = value.as<uint32_t>() * uint64_t{0x100000001};
-    return ((load_le<uint64_t>(p) ^ pair) | (load_le<uint64_t>(p + 8) ^ pair) |
-            (load_le<uint64_t>(p + 16) ^ pair) | (load_le<uint64_t>(p + 24) ^ pair)) == 0;
+    return ((load_aligned_le<uint64_t>(p) ^ pair) | (load_aligned_le<uint64_t>(p + 8) ^ pair) |
+            (load_aligned_le<uint64_t>(p + 16) ^ pair) | (load_aligned_le<uint64_t>(p + 24) ^ pair)) == 0;
   }
   VOX_HD_HOT bool same_in_subblock(const StructuralBlock& block, int64_t subblock, const Voxel& value) const {
     if (view_->layout == Layout::plain && view_->value_bytes == 4)
       return same_words(block.bytes + subblock * 32, value);
     if (view_->layout == Layout::plain && view_->value_bytes == 1)
-      return load_le<uint64_t>(block.bytes + subblock * 8) ==
+      return load_aligned_le<uint64_t>(block.bytes + subblock * 8) ==
              value.as<uint32_t>() * uint64_t{0x0101010101010101};
     for (int i = 0; i < 8; ++i)
       if (block.value(subblock * 8 + i).template as<uint32_t>() != value.as<uint32_t>()) return false;
@@ -107,7 +111,7 @@ class Walk {
   int level_;  ///< of the innermost block of the path
   uint32_t entered_ = 0, bytes_ = 0, at_[3] = {};
   Voxel parent_;  ///< undecoded value of the equivalent voxel of the base block
-  const std::byte* blocks_[max_levels];
+  const std::byte* blocks_[with_path ? max_levels : 1];  ///< of the path by level, or the root
 };
 
 /// The blocks of a mapped file. A chunk is verified when it is first asked for; `Store::status` tells what

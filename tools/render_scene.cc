@@ -18,12 +18,12 @@ tl::unexpected<Error> named(Error error, const std::string& name) {
 }
 
 /// For direct volume rendering: from the compressed form where there is one.
-Result<std::shared_ptr<const DvrVolume>> open_volume(Input& input, bool cuda, Run& run) {
+Result<std::shared_ptr<const DvrVolume>> open_volume(Input& input, bool device, Run& run) {
   if (is_colour(input.source->info().format))
     return bad_input({}, fmt::format("voxels are {}: expected a scalar volume for --mode dvr",
                                      voxkit::name(input.source->info().format)));
   const auto opened = [&]() -> Result<DvrVolume> {
-    if (input.svmm && !cuda) {  // GPUs have no code for it: they get the voxels
+    if (input.svmm && !device) {  // which has no code for it: it gets the voxels
       run.stage("measure");
       return DvrVolume::open(input.svmm, run.ctx);
     }
@@ -38,7 +38,22 @@ Result<std::shared_ptr<const DvrVolume>> open_volume(Input& input, bool cuda, Ru
 
 }  // namespace
 
-Status Scene::draw(const Camera& camera, CastOptions options, const DvrOptions& dvr_options, DvrFrame& frame,
+Status Scene::classify(const TransferFunction& transfer, const SceneOptions& options, Run& run) {
+  VOX_TRY(dvr, DvrScene::create(volume, transfer, run.ctx));
+  if (options.backend) {
+    run.stage("upload");
+    VOX_TRY(device_dvr, DeviceDvr::upload(*dvr, options.backend, run.ctx));
+  }
+  return {};
+}
+
+FrameJob Scene::job(FrameJob wanted) const {
+  wanted.details |= dag || device || device_dvr;  // where to look colours up, what was hit
+  wanted.costs = device || device_dvr;
+  return wanted;
+}
+
+Status Scene::draw(const Camera& camera, CastOptions options, const DvrOptions& dvr_options, Frame& frame,
                    Context& ctx) const {
   if (device_dvr) return device_dvr->draw(camera, dvr_options, frame, ctx);
   if (dvr) return dvr->draw(camera, dvr_options, frame, ctx);
@@ -54,7 +69,7 @@ Result<Scene> open_scene(const std::string& name, const SceneOptions& o, Run& ru
   Scene scene;
   scene.info = input.source->info();
   if (o.dvr) {
-    auto volume = open_volume(input, o.cuda, run);
+    auto volume = open_volume(input, o.backend != nullptr, run);
     if (!volume) return named(std::move(volume).error(), name);
     scene.volume = std::move(*volume);
     return scene;
@@ -78,9 +93,9 @@ Result<Scene> open_scene(const std::string& name, const SceneOptions& o, Run& ru
     run.stage("read");
     VOX_TRY(scene.dense, DenseGrid::read(*input.source, run.ctx));
   }
-  if (o.cuda) {
+  if (o.backend) {
     run.stage("upload");
-    const auto upload = [&](const auto& grid) { return DeviceGrid::upload(grid, run.ctx); };
+    const auto upload = [&](const auto& grid) { return DeviceGrid::upload(grid, o.backend, run.ctx); };
     VOX_TRY(scene.device, scene.compressed ? upload(*scene.compressed)
                           : scene.dag      ? upload(*scene.dag)
                                            : upload(*scene.dense));

@@ -18,7 +18,7 @@ struct SceneOptions {
   OpenOptions open;
   std::optional<ValueRange> range;  ///< sample values
   bool dvr = false;
-  bool cuda = false;
+  std::shared_ptr<const render::Backend> backend;  ///< that draws; null: this machine, its own way
 };
 
 /// A volume that is ready to be drawn.
@@ -35,8 +35,12 @@ struct Scene {
   std::optional<render::DvrScene> dvr;
   std::unique_ptr<const render::DeviceDvr> device_dvr;  ///< of `dvr`, which must not be moved then
 
+  /// With a transfer function, before direct volume rendering.
+  Status classify(const render::TransferFunction& transfer, const SceneOptions& options, Run& run);
+  /// What a frame has to hold of which `wanted` is wanted.
+  render::FrameJob job(render::FrameJob wanted) const;
   Status draw(const render::Camera& camera, render::CastOptions options,
-              const render::DvrOptions& dvr_options, render::DvrFrame& frame, Context& ctx) const;
+              const render::DvrOptions& dvr_options, render::Frame& frame, Context& ctx) const;
 };
 
 Result<Scene> open_scene(const std::string& name, const SceneOptions& options, Run& run);

@@ -5,7 +5,6 @@
 #include <cmath>
 #include <cstdio>
 #include <numeric>
-#include <string_view>
 #include <utility>
 #include <vector>
 
@@ -15,137 +14,17 @@
 #include "libmetrics/image_diff.h"
 #include "libmetrics/ssim.h"
 #include "librender/camera_file.h"
-#include "librender/layers.h"
 #include "librender/shade.h"
 #include "tools/common/input.h"
 #include "tools/common/json.h"
 #include "tools/common/main.h"
-#include "tools/common/retype.h"
+#include "tools/render_options.h"
 #include "tools/render_scene.h"
 
 namespace voxkit::cli {
 namespace {
 
 using namespace voxkit::render;
-
-constexpr int most_rays_a_side = 65536;  ///< of a picture
-
-struct Options {
-  std::string input, output, path, report, reference;
-  SceneOptions scene;
-  int width = 1024, height = 768;
-  std::string camera = "orbit:30,20,1.8", mode = "surface", traversal = "path", reference_traversal,
-              shade = "phong", lod = "off", skip = "on", device = "cpu";
-  bool depth_antialias = false;
-  int rays_a_side = 1;  ///< of a pixel
-  std::vector<Layer> layers;
-  bool wants(Layer layer) const { return std::find(layers.begin(), layers.end(), layer) != layers.end(); }
-  double fov = 45;
-  // Direct volume rendering; empty where not given.
-  std::string transfer, gradient;
-  std::optional<double> step, modulate;
-  bool no_images = false;
-};
-
-Status parse_antialias(const std::string& text, Options& o) {
-  constexpr int most = 16;
-  o.depth_antialias = text == "depth";
-  o.rays_a_side = 1;
-  if (text == "none" || text == "depth") return {};
-  const auto n = text.starts_with("ssaa:") ? read_integer(text.substr(5), 2, most) : bad_usage({});
-  if (!n)
-    return bad_usage(fmt::format("\"{}\": expected none, depth or ssaa:N with N from 2 to {}", text, most));
-  o.rays_a_side = static_cast<int>(*n);
-  return {};
-}
-
-Status parse_layers(const std::string& text, std::vector<Layer>& layers) {
-  const std::pair<std::string_view, Layer> names[] = {{"depth", Layer::depth},
-                                                      {"normal", Layer::normal},
-                                                      {"position", Layer::position},
-                                                      {"steps", Layer::steps}};
-  layers.clear();
-  for (size_t at = 0; at <= text.size();) {
-    const size_t comma = std::min(text.find(',', at), text.size());
-    const auto found = std::find_if(std::begin(names), std::end(names), [&](const auto& name) {
-      return name.first == std::string_view(text).substr(at, comma - at);
-    });
-    if (found == std::end(names) || std::find(layers.begin(), layers.end(), found->second) != layers.end())
-      return bad_usage(fmt::format(
-          "\"{}\": expected some of depth, normal, position and steps, with commas between them", text));
-    layers.push_back(found->second);
-    at = comma + 1;
-  }
-  return {};
-}
-
-void declare(CommandLine& line, Options& o) {
-  line.argument("INPUT", "Volume: a file, a built-in such as menger:5, or -", o.input);
-  line.file("-o,--output", "OUT",
-            "Picture (.png .tif, or .exr for floats), with --path a pattern such as frame-%04d.png",
-            o.output);
-  line.option("--size", "WxH", "Size of the picture in pixels (1024x768)",
-              [&o](const std::string& text) -> Status {
-                const size_t x = text.find('x');
-                if (x == std::string::npos)
-                  return bad_usage("\"" + text + "\": expected WxH, such as 1920x1080");
-                VOX_TRY(const int64_t width, read_integer(text.substr(0, x), 1, 65536));
-                VOX_TRY(const int64_t height, read_integer(text.substr(x + 1), 1, 65536));
-                o.width = static_cast<int>(width), o.height = static_cast<int>(height);
-                return {};
-              });
-  line.text("--camera", "CAMERA",
-            "orbit:AZ,EL,DIST or lookat:EX,EY,EZ,TX,TY,TZ; the longest side is 1 (orbit:30,20,1.8)",
-            o.camera);
-  line.option("--fov", "DEG", "Vertical field of view (45)", number(o.fov, 0.01, 179));
-  line.file("--path", "PATH",
-            "A camera path: thesis94, orbit:N or FILE.json, as tools/README.md describes it", o.path);
-  line.option("--mode", "MODE",
-              "surface: shades what a ray meets first; dvr: direct volume rendering, of scalars (surface)",
-              one_of(o.mode, {"surface", "dvr"}));
-  line.file("--tf", "TF", "dvr: transfer function, FILE.json or one of " + transfer_presets() + " (gray)",
-            o.transfer);
-  line.option("--step", "S", "dvr: distance of samples in smallest voxel edges (0.25)",
-              number(o.step, least_step, greatest_step));
-  line.option("--gradient", "KIND",
-              "dvr: analytic: of the trilinear cell; neighbour: from samples of neighbouring rays (analytic)",
-              one_of(o.gradient, {"analytic", "neighbour"}));
-  line.option("--modulate", "G",
-              "dvr: multiply opacity by G times the gradient, in widths of the transfer function a voxel, up "
-              "to 1 (0: off)",
-              number(o.modulate, 0, 1e6));
-  line.option("--traversal", "KIND",
-              "path: keeps the path of blocks; restart: from the root at every step; baseline: voxel by "
-              "voxel in floats, uncompressed volumes only (path)",
-              one_of(o.traversal, {"path", "restart", "baseline"}));
-  line.option("--shade", "KIND", "none, phong, ssao or phong+ssao (phong)",
-              one_of(o.shade, {"none", "phong", "ssao", "phong+ssao"}));
-  line.option("--aa", "KIND",
-              "none; depth: softens steps in depth; ssaa:N: N x N rays a pixel, N from 2 to 16 (none)",
-              [&o](const std::string& text) { return parse_antialias(text, o); });
-  line.option(
-      "--aov", "LAYERS",
-      "Further layers of an .exr, as floats: some of depth,normal,position,steps; with ssaa:N those of "
-      "the ray at the pixel's centre",
-      [&o](const std::string& text) { return parse_layers(text, o.layers); });
-  line.option("--lod", "on|off", "Stop at voxels as small as a pixel (off)", one_of(o.lod, {"on", "off"}));
-  line.option(
-      "--skip", "on|off",
-      "Step over whole cells of one value, of what cannot be seen; off: voxel by voxel, all samples (on)",
-      one_of(o.skip, {"on", "off"}));
-  line.option("--device", "DEVICE", "Where to render: cpu or cuda, a GPU (cpu)",
-              one_of(o.device, {"cpu", "cuda"}));
-  declare_range_option(
-      line, o.scene.range,
-      "Sample values that are shown as 0 and 1, or that a preset spans (default: full scale, or measured)");
-  line.file("--reference", "INPUT2", "Render this as well, and report how far the pictures are apart",
-            o.reference);
-  line.option("--reference-traversal", "KIND", "That of the reference (as --traversal)",
-              one_of(o.reference_traversal, {"path", "restart", "baseline"}));
-  line.file("--report", "OUT.json", "Write what every frame cost", o.report);
-  line.flag("--no-images", "Render and report only", o.no_images);
-  declare_input_options(line, o.scene.open);
-}
 
 /// An 8-bit RGB picture.
 Result<Image> image_of(const Image& picture, Context& ctx) {
@@ -155,33 +34,6 @@ Result<Image> image_of(const Image& picture, Context& ctx) {
       for (int64_t k = 0; k < 3; ++k) image.row(y)[3 * x + k] = std::round(255 * picture.row(y)[4 * x + k]);
   return image;
 }
-
-/// Memory that is held from the start, so that too large a picture is refused before any work.
-class Held {
- public:
-  /// For the frames of the input and of the reference. What comes of them must fit beside them, but counts
-  /// when it is made.
-  static Result<Held> for_frames(const Options& o, bool pictures, Context& ctx) {
-    const uint64_t pixels = static_cast<uint64_t>(o.width) * static_cast<uint64_t>(o.height);
-    const uint64_t rays = pixels * static_cast<uint64_t>(o.rays_a_side * o.rays_a_side);
-    const uint64_t ray_bytes = sizeof(Pixel) + (o.wants(Layer::steps) ? sizeof(PixelDetail) : 0);
-    const uint64_t frames = rays * ray_bytes * (o.reference.empty() ? 1 : 2);
-    constexpr uint64_t written_bytes = (4 + 3 + 3 + 8) * sizeof(float);  // a pixel: floats, integers, layers
-    const uint64_t rest = pictures ? rays * shading_bytes + pixels * written_bytes : 0;
-    const std::string what =
-        fmt::format("a frame of {} x {} rays", o.width * o.rays_a_side, o.height * o.rays_a_side);
-    VOX_CHECK(ctx.memory->reserve(frames + rest, what));
-    ctx.memory->release(rest);
-    return Held(*ctx.memory, frames);
-  }
-  Held(Held&& other) noexcept : budget_(other.budget_), bytes_(std::exchange(other.bytes_, 0)) {}
-  ~Held() { budget_.release(bytes_); }
-
- private:
-  Held(MemoryBudget& budget, uint64_t bytes) : budget_(budget), bytes_(bytes) {}
-  MemoryBudget& budget_;
-  uint64_t bytes_;
-};
 
 Traversal traversal_of(const std::string& name) {
   return name == "restart" ? Traversal::restart : name == "baseline" ? Traversal::baseline : Traversal::path;
@@ -199,7 +51,7 @@ struct Costs {
   double mrays_per_s() const {
     return static_cast<double>(rays) / 1e3 / std::max(average() * static_cast<double>(ms.size()), 1e-9);
   }
-  void add(const DvrFrame& frame, Json json) {
+  void add(const Frame& frame, Json json) {
     ms.push_back(frame.seconds * 1000);
     rays += frame.rays;
     json.set("ms", ms.back())
@@ -218,179 +70,245 @@ struct Costs {
   }
 };
 
-/// Options that do not go with the mode.
-Status check_mode(const Options& o) {
-  if (o.mode != "dvr") {
-    const char* const given = !o.transfer.empty()   ? "--tf"
-                              : o.step              ? "--step"
-                              : !o.gradient.empty() ? "--gradient"
-                              : o.modulate          ? "--modulate"
-                                                    : nullptr;
-    return given == nullptr ? Status{} : bad_usage(fmt::format("{}: expected --mode dvr", given));
+/// What is to be drawn, checked before any work.
+struct Plan {
+  std::vector<Camera> cameras;
+  std::vector<std::string> names;          ///< of the pictures, one a camera, or none
+  bool exr = false;                        ///< pictures are floats, with layers
+  bool pictures = false;                   ///< written, or compared
+  std::shared_ptr<const Backend> backend;  ///< null: cpu
+};
+
+/// The picture's name for each camera.
+Status name_pictures(const RenderOptions& o, bool force, Plan& plan) {
+  const bool pattern = is_numbered(o.output);
+  if (!o.path.empty() && !pattern)
+    return bad_usage("-o " + o.output + ": a path needs a pattern such as frame-%04d.png");
+  for (size_t i = 0; i < plan.cameras.size(); ++i) {
+    plan.names.push_back(o.output);
+    if (pattern) {
+      VOX_TRY(const NumberedName numbered, numbered_name(o.output));
+      plan.names.back() = numbered.path(i);
+    }
+    VOX_CHECK(check_image_output(plan.names.back(), force));
   }
-  const bool wrong[] = {o.traversal != "path" || !o.reference_traversal.empty(),
-                        o.shade.find("ssao") != std::string::npos, o.depth_antialias, o.lod == "on"};
-  const char* const expected[] = {"--traversal: expected path", "--shade: expected none or phong",
-                                  "--aa: expected none or ssaa:N", "--lod: expected off"};
-  for (int i = 0; i < 4; ++i)
-    if (wrong[i]) return bad_usage(fmt::format("{} with --mode dvr", expected[i]));
-  if (o.scene.range && !o.transfer.empty() && !is_transfer_preset(o.transfer))
-    return bad_usage("--range: expected a preset, whose values it gives, not a file");
-  return o.transfer.empty() ? Status{} : check_transfer(o.transfer);
+  return {};
 }
 
-Result<int> work(const Options& o, Run& run) {
+/// Options, device, names and outputs, in this order.
+Result<Plan> check(const RenderOptions& o, const Run& run) {
   VOX_CHECK(check_mode(o));
   if (!o.reference_traversal.empty() && o.reference.empty())
     return bad_usage("--reference-traversal: there is no reference: expected --reference INPUT2");
-  if (o.device == "cuda") VOX_CHECK(check_device());
+  Plan plan;
+  if (o.device == "cuda") {
+    VOX_TRY(plan.backend, Backend::open(BackendKind::cuda));
+  }
   if (o.output.empty() && !o.no_images) return bad_usage("no output: expected -o OUT.png, or --no-images");
-  const bool exr = !o.no_images && has_ending(o.output, ".exr");
-  if (!o.layers.empty() && !exr)
+  plan.exr = !o.no_images && has_ending(o.output, ".exr");
+  plan.pictures = !o.no_images || !o.reference.empty();
+  if (!o.layers.empty() && !plan.exr)
     return bad_usage("--aov: layers are part of an OpenEXR file: expected -o OUT.exr");
   if (std::max(o.width, o.height) * o.rays_a_side > most_rays_a_side)
     return bad_usage(fmt::format("{} x {} rays: expected at most {} a side", o.width * o.rays_a_side,
                                  o.height * o.rays_a_side, most_rays_a_side));
   VOX_TRY(const Camera camera, parse_camera(o.camera, o.fov));
-  std::vector<Camera> cameras = {camera};
   if (has_ending(o.path, ".json")) {
-    VOX_TRY(cameras, read_camera_file(o.path, o.fov));
+    VOX_TRY(plan.cameras, read_camera_file(o.path, o.fov));
   } else if (!o.path.empty()) {
-    VOX_TRY(cameras, camera_path(o.path, camera));
+    VOX_TRY(plan.cameras, camera_path(o.path, camera));
+  } else {
+    plan.cameras = {camera};
   }
-  std::vector<std::string> names;
-  if (!o.no_images) {
-    const bool pattern = is_numbered(o.output);
-    if (!o.path.empty() && !pattern)
-      return bad_usage("-o " + o.output + ": a path needs a pattern such as frame-%04d.png");
-    for (size_t i = 0; i < cameras.size(); ++i) {
-      names.push_back(o.output);
-      if (pattern) {
-        VOX_TRY(const NumberedName numbered, numbered_name(o.output));
-        names.back() = numbered.path(i);
-      }
-      VOX_CHECK(check_image_output(names.back(), run.options.force));
-    }
-  }
+  if (!o.no_images) VOX_CHECK(name_pictures(o, run.options.force, plan));
   if (!o.report.empty()) VOX_CHECK(check_output(o.report, run.options.force));
+  return plan;
+}
 
-  const bool normals = o.wants(Layer::normal);
-  const bool pictures = !names.empty() || !o.reference.empty();
-  VOX_TRY(const Held frames, Held::for_frames(o, pictures, run.ctx));
-  CastOptions cast_options;
-  cast_options.width = o.width * o.rays_a_side;
-  cast_options.height = o.height * o.rays_a_side;
-  cast_options.traversal = traversal_of(o.traversal);
-  cast_options.level_of_detail = o.lod == "on";
-  cast_options.skip = o.skip == "on";
-  cast_options.details = o.wants(Layer::steps);
-  ShadeOptions shade_options;
-  shade_options.phong = o.shade.find("phong") != std::string::npos;
-  shade_options.ssao = o.shade.find("ssao") != std::string::npos;
-  shade_options.depth_antialias = o.depth_antialias;
+/// The options of a frame, for every part that takes some.
+struct FrameOptions {
+  CastOptions cast;
+  DvrOptions dvr;
+  ShadeOptions shade;
+  SceneOptions scene;
+};
+FrameOptions options_of(const RenderOptions& o, const Plan& plan) {
+  FrameOptions options;
+  CastOptions& cast = options.cast;
+  cast.width = o.width * o.rays_a_side;
+  cast.height = o.height * o.rays_a_side;
+  cast.traversal = traversal_of(o.traversal);
+  cast.level_of_detail = o.lod == "on";
+  cast.skip = o.skip == "on";
+  cast.details = o.wants(Layer::steps);
+  const bool phong = o.shade.find("phong") != std::string::npos;
+  DvrOptions& dvr = options.dvr;
+  dvr.width = cast.width;
+  dvr.height = cast.height;
+  dvr.step = o.step.value_or(0.25);
+  dvr.gradient = o.gradient == "neighbour" ? Gradient::neighbour : Gradient::analytic;
+  dvr.modulate = o.modulate.value_or(0);
+  dvr.lit = phong;
+  dvr.skip = cast.skip;
+  dvr.details = cast.details;
+  options.scene = o.scene;
+  options.scene.dvr = o.mode == "dvr";
+  options.scene.backend = plan.backend;
+  options.shade.phong = phong && !options.scene.dvr;  // there every sample is lit by itself
+  options.shade.ssao = o.shade.find("ssao") != std::string::npos;
+  options.shade.depth_antialias = o.depth_antialias;
+  return options;
+}
 
-  const bool dvr = o.mode == "dvr";
-  DvrOptions dvr_options;
-  dvr_options.width = cast_options.width;
-  dvr_options.height = cast_options.height;
-  dvr_options.step = o.step.value_or(0.25);
-  dvr_options.gradient = o.gradient == "neighbour" ? Gradient::neighbour : Gradient::analytic;
-  dvr_options.modulate = o.modulate.value_or(0);
-  dvr_options.lit = shade_options.phong;
-  dvr_options.skip = cast_options.skip;
-  dvr_options.details = cast_options.details;
-  if (dvr) shade_options.phong = false;  // every sample is lit by itself
-
-  SceneOptions scene_options = o.scene;
-  scene_options.dvr = dvr;
-  scene_options.cuda = o.device == "cuda";
-  VOX_TRY(Scene scene, open_scene(o.input, scene_options, run));
+/// The input and what it is compared with, each with a frame whose memory serves all pictures.
+struct Drawn {
+  Scene scene;
   std::optional<Scene> other;
+  Frame frame, expected;
+};
+
+/// Holds the memory of both frames from the start, so that too large a picture is refused before any work;
+/// and again once it is known what the volumes need. What comes of the frames must fit beside them, but
+/// counts when it is made.
+Result<Reservation> hold_frames(const RenderOptions& o, const Plan& plan, const FrameJob& frame,
+                                const FrameJob& expected, Context& ctx) {
+  const uint64_t frames = frame.bytes() + (o.reference.empty() ? 0 : expected.bytes());
+  constexpr uint64_t written_bytes = (4 + 3 + 3 + 8) * sizeof(float);  // a pixel: floats, integers, layers
+  const uint64_t pixels = static_cast<uint64_t>(o.width) * static_cast<uint64_t>(o.height);
+  const uint64_t rest = plan.pictures ? frame.rays() * shading_bytes + pixels * written_bytes : 0;
+  VOX_TRY(Reservation held,
+          Reservation::take(frames + rest, fmt::format("a frame of {} x {} rays", frame.width, frame.height),
+                            ctx));
+  held.release(rest);
+  return held;
+}
+
+/// Opens the volumes.
+Status open(const RenderOptions& o, const SceneOptions& options, Drawn& drawn, Run& run) {
+  VOX_TRY(drawn.scene, open_scene(o.input, options, run));
+  Scene& scene = drawn.scene;
   if (!o.reference.empty()) {
-    VOX_TRY(other, open_scene(o.reference, scene_options, run));
-    if (other->info.dims != scene.info.dims)
+    VOX_TRY(drawn.other, open_scene(o.reference, options, run));
+    const Index3& dims = drawn.other->info.dims;
+    if (dims != scene.info.dims)
       return bad_usage(fmt::format("--reference {}: {} x {} x {} voxels: expected as many as the input has",
-                                   o.reference, other->info.dims.x, other->info.dims.y, other->info.dims.z));
+                                   o.reference, dims.x, dims.y, dims.z));
   }
-  if (dvr) {
-    // Both are seen through one function: where it depends on values, on those of the reference.
-    run.stage("classify");
-    VOX_TRY(const TransferFunction transfer,
-            find_transfer(o.transfer.empty() ? "gray" : o.transfer, scene_options, other ? *other : scene));
-    for (Scene* const each : {&scene, other ? &*other : nullptr})
-      if (each != nullptr) {
-        VOX_TRY(each->dvr, DvrScene::create(each->volume, transfer, run.ctx));
-        if (scene_options.cuda) {
-          run.stage("upload");
-          VOX_TRY(each->device_dvr, DeviceDvr::upload(*each->dvr, run.ctx));
-        }
+  if (!options.dvr) return {};
+  // Both are seen through one function: where it depends on values, on those of the reference.
+  run.stage("classify");
+  VOX_TRY(const TransferFunction transfer, find_transfer(o.transfer.empty() ? "gray" : o.transfer, options,
+                                                         drawn.other ? *drawn.other : scene));
+  for (Scene* const each : {&scene, drawn.other ? &*drawn.other : nullptr})
+    if (each != nullptr) VOX_CHECK(each->classify(transfer, options, run));
+  return {};
+}
+
+/// What the pictures of a run cost, and how far they are from the reference, on average.
+struct Outcome {
+  Costs costs, other;
+  double rmse = 0, psnr = 0, ms_ssim = 0;
+};
+
+/// Draws, shades, writes and compares the pictures, one after the other.
+class Drawing {
+ public:
+  Drawing(const RenderOptions& o, const Plan& plan, const FrameOptions& options, Drawn& drawn, Run& run)
+      : o_(o), plan_(plan), options_(options), drawn_(drawn), run_(run) {}
+
+  Result<Outcome> draw() {
+    run_.stage("render");
+    const double count = static_cast<double>(plan_.cameras.size());
+    for (size_t i = 0; i < plan_.cameras.size(); ++i) {
+      const Camera& camera = plan_.cameras[i];
+      VOX_CHECK(drawn_.scene.draw(camera, options_.cast, options_.dvr, drawn_.frame, run_.ctx));
+      Json json = Json::object();
+      std::optional<Image> picture;
+      if (plan_.pictures) {
+        VOX_TRY(picture, write(i));
       }
+      if (drawn_.other) VOX_CHECK(compare(camera, *picture, json));
+      outcome_.costs.add(drawn_.frame, std::move(json));
+      run_.ctx.progress(static_cast<double>(i + 1) / count);
+    }
+    return std::move(outcome_);
   }
-  const double edge = GridTransform(scene.info).largest_edge();
-  const auto shaded = [&](const Frame& seen, const Camera& from, bool with_normals) -> Result<Picture> {
-    shade_options.normals = with_normals;
-    VOX_TRY(Picture picture, shade(seen, from, edge, shade_options, run.ctx));
-    if (o.rays_a_side > 1) {
-      VOX_TRY(picture.rgba, downsample(picture.rgba, o.rays_a_side, run.ctx));
+
+ private:
+  /// A picture as large as it is asked for.
+  Result<Picture> shaded(const Frame& frame, const Camera& camera, bool normals) {
+    ShadeOptions options = options_.shade;
+    options.normals = normals;
+    const double edge = GridTransform(drawn_.scene.info).largest_edge();
+    VOX_TRY(Picture picture, shade(frame, camera, edge, options, run_.ctx));
+    if (o_.rays_a_side > 1) {
+      VOX_TRY(picture.rgba, downsample(picture.rgba, o_.rays_a_side, run_.ctx));
     }
     return picture;
-  };
-
-  run.stage("render");
-  Costs costs, other_costs;
-  DvrFrame frame, expected;  // their memory serves all frames
-  double rmse = 0, psnr = 0, ms_ssim = 0;
-  const double count = static_cast<double>(cameras.size());
-  for (size_t i = 0; i < cameras.size(); ++i) {
-    VOX_CHECK(scene.draw(cameras[i], cast_options, dvr_options, frame, run.ctx));
-    Json json = Json::object();
-    std::optional<Image> picture;
-    if (pictures) {
-      VOX_TRY(Picture floats, shaded(frame, cameras[i], normals));
-      std::vector<ImageLayer> layers;
-      for (const Layer layer : o.layers) {
-        VOX_TRY(ImageLayer made,
-                make_layer(layer, frame, cameras[i], floats.normals, o.rays_a_side, run.ctx));
-        layers.push_back(std::move(made));
-      }
-      if (exr) VOX_CHECK(write_image(names[i], floats.rgba, run.options.force, layers));
-      VOX_TRY(picture, image_of(floats.rgba, run.ctx));
-      if (!exr && !names.empty()) VOX_CHECK(write_image(names[i], *picture, run.options.force));
+  }
+  /// Writes picture i where it has a name; returns it in 8 bits.
+  Result<Image> write(size_t i) {
+    const Camera& camera = plan_.cameras[i];
+    VOX_TRY(Picture floats, shaded(drawn_.frame, camera, o_.wants(Layer::normal)));
+    std::vector<ImageLayer> layers;
+    for (const Layer layer : o_.layers) {
+      VOX_TRY(ImageLayer made,
+              make_layer(layer, drawn_.frame, camera, floats.normals, o_.rays_a_side, run_.ctx));
+      layers.push_back(std::move(made));
     }
-    if (other) {
-      CastOptions reference_options = cast_options;
-      if (!o.reference_traversal.empty()) reference_options.traversal = traversal_of(o.reference_traversal);
-      VOX_CHECK(other->draw(cameras[i], reference_options, dvr_options, expected, run.ctx));
-      VOX_TRY(const Picture floats, shaded(expected, cameras[i], false));
-      VOX_TRY(const Image reference, image_of(floats.rgba, run.ctx));
-      VOX_TRY(const ImageDiff diff, diff_images(reference, *picture, std::nullopt, run.ctx));
-      VOX_TRY(const Image a, luma(reference, run.ctx));
-      VOX_TRY(const Image b, luma(*picture, run.ctx));
-      VOX_TRY(const Ssim similarity, ssim(a, b, std::nullopt, run.ctx));
-      json.set("rmse", diff.rmse).set("psnr_db", diff.psnr_db).set("ms_ssim", similarity.ms_ssim);
-      rmse += diff.rmse / count, psnr += diff.psnr_db / count, ms_ssim += similarity.ms_ssim / count;
-      other_costs.add(expected, Json::object());
-    }
-    costs.add(frame, std::move(json));
-    run.ctx.progress(static_cast<double>(i + 1) / count);
+    const bool force = run_.options.force;
+    if (plan_.exr) VOX_CHECK(write_image(plan_.names[i], floats.rgba, force, layers));
+    VOX_TRY(Image picture, image_of(floats.rgba, run_.ctx));
+    if (!plan_.exr && !plan_.names.empty()) VOX_CHECK(write_image(plan_.names[i], picture, force));
+    return picture;
+  }
+  /// Draws the reference, and notes how far a picture is from it.
+  Status compare(const Camera& camera, const Image& picture, Json& json) {
+    Context& ctx = run_.ctx;
+    CastOptions options = options_.cast;
+    if (!o_.reference_traversal.empty()) options.traversal = traversal_of(o_.reference_traversal);
+    VOX_CHECK(drawn_.other->draw(camera, options, options_.dvr, drawn_.expected, ctx));
+    VOX_TRY(const Picture floats, shaded(drawn_.expected, camera, false));
+    VOX_TRY(const Image reference, image_of(floats.rgba, ctx));
+    VOX_TRY(const ImageDiff diff, diff_images(reference, picture, std::nullopt, ctx));
+    VOX_TRY(const Image a, luma(reference, ctx));
+    VOX_TRY(const Image b, luma(picture, ctx));
+    VOX_TRY(const Ssim similarity, ssim(a, b, std::nullopt, ctx));
+    json.set("rmse", diff.rmse).set("psnr_db", diff.psnr_db).set("ms_ssim", similarity.ms_ssim);
+    const double count = static_cast<double>(plan_.cameras.size());
+    outcome_.rmse += diff.rmse / count, outcome_.psnr += diff.psnr_db / count;
+    outcome_.ms_ssim += similarity.ms_ssim / count;
+    outcome_.other.add(drawn_.expected, Json::object());
+    return {};
   }
 
-  const double average = costs.average(), speed = costs.mrays_per_s();
+  const RenderOptions& o_;
+  const Plan& plan_;
+  const FrameOptions& options_;
+  Drawn& drawn_;
+  Run& run_;
+  Outcome outcome_;
+};
+
+/// Writes and prints what it cost.
+Status report(const RenderOptions& o, const Plan& plan, const Drawn& drawn, Outcome outcome, Run& run) {
+  const double average = outcome.costs.average(), speed = outcome.costs.mrays_per_s();
   Json json = Json::result();
   json.set("tool", run.tool).set("version", version_text()).set("input", o.input).set("device", o.device);
   json.set("size", fmt::format("{}x{}", o.width, o.height)).set("mode", o.mode).set("traversal", o.traversal);
-  if (dvr) {
-    const Index3 bricks = scene.volume->ranges().bricks();
-    json.set("bricks", bricks.x * bricks.y * bricks.z).set("bricks_visible", scene.dvr->visible_bricks());
+  if (o.mode == "dvr") {
+    const Index3 bricks = drawn.scene.volume->ranges().bricks();
+    json.set("bricks", bricks.x * bricks.y * bricks.z)
+        .set("bricks_visible", drawn.scene.dvr->visible_bricks());
   }
-  costs.write(json);
-  if (other) {
+  outcome.costs.write(json);
+  if (drawn.other) {
     Json reference = Json::object();
     reference.set("input", o.reference);
-    json.set("speed_ratio", other_costs.average() / average);
-    other_costs.write(reference);
+    json.set("speed_ratio", outcome.other.average() / average);
+    outcome.other.write(reference);
     json.set("reference", std::move(reference));
-    json.set("rmse_avg", rmse).set("psnr_db_avg", psnr).set("ms_ssim_avg", ms_ssim);
+    json.set("rmse_avg", outcome.rmse).set("psnr_db_avg", outcome.psnr).set("ms_ssim_avg", outcome.ms_ssim);
   }
   json.set("threads", run.options.threads).set("peak_rss_bytes", peak_rss_bytes());
   if (!o.report.empty()) {
@@ -400,9 +318,28 @@ Result<int> work(const Options& o, Run& run) {
   }
   if (run.options.json) VOX_CHECK(print(json.text()));
   if (!run.options.quiet && !run.options.json)
-    fmt::print(stderr, "{}: {} frames of {}x{}, {:.3g} ms a frame, {:.3g} million rays a second{}\n", o.input,
-               cameras.size(), o.width, o.height, average, speed,
-               other ? fmt::format("; {} dB, MS-SSIM {:.6f}", readable(psnr), ms_ssim) : "");
+    fmt::print(
+        stderr, "{}: {} frames of {}x{}, {:.3g} ms a frame, {:.3g} million rays a second{}\n", o.input,
+        plan.cameras.size(), o.width, o.height, average, speed,
+        drawn.other ? fmt::format("; {} dB, MS-SSIM {:.6f}", readable(outcome.psnr), outcome.ms_ssim) : "");
+  return {};
+}
+
+Result<int> work(const RenderOptions& o, Run& run) {
+  VOX_TRY(const Plan plan, check(o, run));
+  const FrameOptions options = options_of(o, plan);
+  Drawn drawn;
+  const FrameJob least{options.cast.width, options.cast.height, options.cast.details};
+  VOX_TRY(Reservation held, hold_frames(o, plan, least, least, run.ctx));
+  VOX_CHECK(open(o, options.scene, drawn, run));
+  held = {};
+  const FrameJob frame = drawn.scene.job(least), expected = drawn.other ? drawn.other->job(least) : least;
+  VOX_TRY(held, hold_frames(o, plan, frame, expected, run.ctx));
+  held = {};
+  VOX_CHECK(drawn.frame.begin(frame, run.ctx));
+  if (drawn.other) VOX_CHECK(drawn.expected.begin(expected, run.ctx));
+  VOX_TRY(Outcome outcome, Drawing(o, plan, options, drawn, run).draw());
+  VOX_CHECK(report(o, plan, drawn, std::move(outcome), run));
   return 0;
 }
 
@@ -411,7 +348,7 @@ Result<int> work(const Options& o, Run& run) {
 
 int main(int argc, char** argv) {
   using namespace voxkit::cli;
-  Options options;
+  RenderOptions options;
   return run_tool(
       argc, argv, "vox-render", "Renders volumes, straight from the compressed form.",
       "  vox-render menger:4 -o sponge.png\n"

@@ -155,33 +155,4 @@ VOX_HD_HOT void cast_ray(const CastParams& params, Cursor& cursor, int x, int y,
   }
 }
 
-/// A block of threads is this many pixels wide and high.
-constexpr int block_width = 8, block_height = 8;
-/// Where a thread of a launch is.
-struct ThreadIndex {
-  unsigned block_x, block_y, thread_x, thread_y;
-};
-/// What a pixel cost, beside its cells.
-struct PixelCost {
-  uint32_t blocks, bytes;
-};
-
-/// The kernel: one thread a pixel. `pixels`, `details` and `costs` have width * height elements.
-template <class View>
-VOX_HD void cast_pixel(const CastParams& params, const View& view, ThreadIndex at, Pixel* pixels,
-                       PixelDetail* details, PixelCost* costs) {
-  const int x = static_cast<int>(at.block_x * block_width + at.thread_x),
-            y = static_cast<int>(at.block_y * block_height + at.thread_y);
-  if (x >= params.width || y >= params.height) return;
-  const int64_t i = int64_t{y} * params.width + x;
-  auto cursor = view.cursor();
-  const bool looked_at = x >= params.left && x < params.right && y >= params.top && y < params.bottom;
-  Pixel pixel;
-  PixelDetail detail;
-  if (looked_at) cast_ray(params, cursor, x, y, pixel, detail);
-  pixels[i] = pixel;
-  details[i] = detail;
-  costs[i] = {cursor.blocks(), cursor.bytes()};
-}
-
 }  // namespace voxkit::render

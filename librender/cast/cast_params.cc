@@ -73,14 +73,12 @@ Result<CastParams> cast_params(const VolumeInfo& info, const Camera& camera, con
   return params;
 }
 
-void add_up(const std::vector<PixelCost>& costs, Frame& frame) {
-  frame.rays = costs.size();
-  frame.rays_hit = frame.cells_visited = frame.blocks_touched = frame.bytes_touched = 0;
-  for (size_t i = 0; i < costs.size(); ++i) {
+void add_up(Frame& frame) {
+  for (size_t i = 0; i < frame.costs.size(); ++i) {
     frame.rays_hit += frame.details[i].voxel[0] >= 0;
     frame.cells_visited += frame.details[i].cells;
-    frame.blocks_touched += costs[i].blocks;
-    frame.bytes_touched += costs[i].bytes;
+    frame.blocks_touched += frame.costs[i].blocks;
+    frame.bytes_touched += frame.costs[i].bytes;
   }
 }
 

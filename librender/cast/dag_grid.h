@@ -19,7 +19,7 @@ struct DagCastView {
   class Cursor {
    public:
     VOX_HD_HOT explicit Cursor(const DagCastView& volume) : dag_(*volume.dag), lowest_(dag_.height) {
-      pointers_[dag_.height] = dag_.root;
+      pointer(dag_.height) = dag_.root;
     }
     /// The value of a cell that is not void is its height, opaque. `finest`: cells of edge 2^finest are fine
     /// enough, where nodes have colours.
@@ -32,18 +32,19 @@ struct DagCastView {
       x_ = x;
       y_ = y;
       z_ = z;
+      if (search == Search::restart) pointer(h) = dag_.root;
       for (; h > color::leaf_height; --h) {
         lowest_ = h;
         if (h <= finest) return {opaque_cell(h), h};
-        const color::NodeRef node = dag_.node(h, pointers_[h]);
+        const color::NodeRef node = dag_.node(h, pointer(h));
         const int s = h - 1;
         const uint32_t octant = (x >> s & 1) | (y >> s & 1) << 1 | (z >> s & 1) << 2;
         ++nodes_;
         if (node.words == nullptr || !node.has(octant)) return {{}, s};
-        pointers_[s] = dag_.pointer(node, node.number(octant));
+        pointer(s) = dag_.pointer(node, node.number(octant));
       }
       lowest_ = color::leaf_height;
-      const uint64_t leaf = dag_.leaf(pointers_[color::leaf_height]);
+      const uint64_t leaf = dag_.leaf(pointer(color::leaf_height));
       if (finest >= color::leaf_height && leaf != 0)
         return {opaque_cell(color::leaf_height), color::leaf_height};
       const uint32_t octant = (x >> 1 & 1) | (y & 2) | (z & 2) << 1;
@@ -61,8 +62,12 @@ struct DagCastView {
     VOX_HD_HOT static Voxel opaque_cell(int height) {
       return Voxel::of(static_cast<uint32_t>(height) | 0xff000000u);
     }
+    /// Of the node of a height, on the path; or of the one that was come to.
+    VOX_HD_HOT uint32_t& pointer(int h) { return pointers_[search == Search::path ? h : 0]; }
+
     const color::DagView& dag_;
-    uint32_t pointers_[color::most_levels + 1];  ///< by height, down to `lowest_`
+    uint32_t
+        pointers_[search == Search::path ? color::most_levels + 1 : 1];  ///< by height, down to `lowest_`
     uint32_t x_ = 0, y_ = 0, z_ = 0;
     int lowest_;
     uint32_t nodes_ = 0;

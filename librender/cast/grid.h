@@ -71,7 +71,6 @@ struct SvmmView {
     VOX_HD_HOT explicit Cursor(const SvmmView& volume) : walk_(*volume.view, *volume.pools) {}
     /// `finest`: cells of edge 2^finest are fine enough; -1: all detail.
     VOX_HD_HOT Cell locate(uint32_t x, uint32_t y, uint32_t z, int finest) {
-      if (search == Search::restart) walk_.restart();
       const auto found = walk_.locate(x, y, z, finest);
       return {found.value, found.log2_edge};
     }
@@ -80,7 +79,7 @@ struct SvmmView {
     VOX_HD_HOT uint32_t bytes() const { return walk_.bytes_read(); }
 
    private:
-    svmm::Walk<Pools> walk_;
+    svmm::Walk<Pools, search == Search::path> walk_;
   };
   VOX_HD_HOT Cursor cursor() const { return Cursor(*this); }
 };

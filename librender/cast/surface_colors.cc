@@ -1,8 +1,8 @@
 #include "librender/cast/surface_colors.h"
 
 #include <algorithm>
-#include <chrono>
 
+#include "formats/clock.h"
 #include "formats/parallel.h"
 #include "libcolor/store.h"
 #include "libcolor/surface/morton.h"
@@ -10,7 +10,7 @@
 namespace voxkit::render {
 
 Status look_up_colors(const color::Volume& volume, Frame& frame, Context& ctx) {
-  const auto start = std::chrono::steady_clock::now();
+  const auto start = Clock::now();
   VOX_TRY(const color::DagView* const dag, volume.store().dag(volume.container(), volume.params()));
   constexpr int64_t rows = 16;  // row by row: neighbours are mostly in one block
   VOX_CHECK(parallel_for(ctx, (frame.height + rows - 1) / rows, [&](int64_t task) -> Status {
@@ -32,7 +32,7 @@ Status look_up_colors(const color::Volume& volume, Frame& frame, Context& ctx) {
     }
     return {};
   }));
-  frame.lookup_seconds = std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
+  frame.lookup_seconds = seconds_since(start);
   frame.seconds += frame.lookup_seconds;
   return volume.store().status();
 }

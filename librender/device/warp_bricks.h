@@ -1,5 +1,5 @@
-// Bricks of a VQ file, decoded by a warp together and kept in its own cache (Guthe and Goesele 2016, section
-// 5): on a device, or lane after lane on a host. `Lanes` as for dvr_packet.h.
+// Bricks of a VQ file, decoded by a group of lanes together and kept in its own cache (Guthe and Goesele
+// 2016, section 5): by a warp on a device, or lane after lane on a host. `Lanes` as for dvr_packet.h.
 #pragma once
 
 #include "librender/dvr/dvr_packet.h"
@@ -7,10 +7,10 @@
 
 namespace voxkit::render {
 
-/// Where decoded bricks are: memory that the lanes of a warp share.
+/// Where decoded bricks are: memory that the lanes of a group share.
 struct WarpCache {
   static constexpr int log2_slots = 5, slots = 1 << log2_slots;
-  uint64_t ids[slots];
+  uint64_t ids[slots];  ///< of bricks; Reader::no_brick: what is there is nobody's
   uint16_t codes[slots][vq::brick_voxels];
 };
 
@@ -92,7 +92,8 @@ class WarpBricks {
         reader_.brick_id(static_cast<uint32_t>(x), static_cast<uint32_t>(y), static_cast<uint32_t>(z));
     const auto slot = static_cast<uint32_t>(id) * 2654435761u >> (32 - WarpCache::log2_slots);
     uint16_t* const codes = cache_->codes[slot];
-    if (cache_->ids[slot] == id) return codes;
+    // A brick that is missing is made up anew each time: the mark of an empty slot is no brick's id.
+    if (id != reader_.no_brick && cache_->ids[slot] == id) return codes;
     Lanes::sync();  // all have read what was there
     decode(id, codes);
     for (int i = 0; i < Lanes::held; ++i)

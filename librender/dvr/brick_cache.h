@@ -19,6 +19,9 @@ namespace voxkit::render {
 /// A brick and the voxels one further on, 5^3 values x fastest, so that all cells that begin in it are there.
 inline constexpr int slot_edge = 5, slot_values = 128;
 
+/// As many decoded bricks of a VQ file a thread remembers.
+inline constexpr uint32_t remembered_bricks = 4096;
+
 /// Makes them, for one thread. T is uint16_t for integers and float.
 template <class T>
 class BrickReader {
@@ -80,9 +83,13 @@ template <class T>
 class BrickCache {
  public:
   explicit BrickCache(std::unique_ptr<BrickReader<T>> reader)
-      : reader_(std::move(reader)),
-        values_(static_cast<size_t>((slots + PortableLanes::count) * slot_values)),
-        places_(slots, -1) {}
+      : reader_(std::move(reader)), values_(values_count), places_(slots, -1) {}
+  /// Of memory that it takes, with its reader, for a volume of so many bricks.
+  static uint64_t bytes(const Index3& bricks) {
+    return values_count * sizeof(T) + slots * sizeof(int32_t) +
+           static_cast<uint64_t>(bricks.x * bricks.y * bricks.z) / 8 +
+           remembered_bricks * (sizeof(uint64_t) + vq::brick_voxels * sizeof(T));
+  }
   const T* values() const { return values_.data(); }
   const BrickReader<T>& reader() const { return *reader_; }
   /// Forgets everything.
@@ -106,6 +113,7 @@ class BrickCache {
 
  private:
   static constexpr int log2_slots = 12, slots = 1 << log2_slots;
+  static constexpr size_t values_count = (slots + PortableLanes::count) * slot_values;
   T* at(int32_t slot) { return values_.data() + int64_t{slot} * slot_values; }
   std::unique_ptr<BrickReader<T>> reader_;
   std::vector<T> values_;

@@ -1,9 +1,9 @@
 #include "librender/dvr/dvr.h"
 
 #include <algorithm>
-#include <chrono>
 #include <cmath>
 
+#include "formats/clock.h"
 #include "formats/parallel.h"
 #include "librender/cast/cast_params.h"
 #include "librender/dvr/dvr_draw.h"
@@ -104,16 +104,8 @@ bool is_direct(const VolumeInfo& info) {
   return std::min({dims.x, dims.y, dims.z}) >= 2 && dims.x * dims.y * dims.z < most_dense_voxels;
 }
 
-Status begin_frame(const DvrJob& job, DvrFrame& frame, Context& ctx) {
+Status blank_around(const DvrJob& job, Frame& frame, Context& ctx) {
   const CastParams& cast = job.params.cast;
-  const bool details = job.details;
-  frame.width = cast.width;
-  frame.height = cast.height;
-  frame.pixels.resize(static_cast<size_t>(cast.width) * static_cast<size_t>(cast.height));
-  frame.details.resize(details ? frame.pixels.size() : 0);
-  frame.rays = frame.pixels.size();
-  frame.rays_hit = frame.cells_visited = frame.blocks_touched = frame.bytes_touched = frame.samples = 0;
-  frame.bricks_decoded = 0;
   return parallel_for(ctx, cast.height, [&](int64_t y) -> Status {
     const bool row = y >= cast.top && y < cast.bottom;
     const int left = row ? std::min(cast.left, cast.width) : cast.width,
@@ -122,7 +114,8 @@ Status begin_frame(const DvrJob& job, DvrFrame& frame, Context& ctx) {
       for (auto i = static_cast<size_t>(y * cast.width + x0); i < static_cast<size_t>(y * cast.width + x1);
            ++i) {
         frame.pixels[i] = {};
-        if (details) frame.details[i] = {};
+        if (!frame.details.empty()) frame.details[i] = {};
+        if (!frame.costs.empty()) frame.costs[i] = {};
       }
     };
     blank(0, left);
@@ -148,10 +141,11 @@ Result<DvrJob> dvr_job(const DvrScene& scene, const Camera& camera, const DvrOpt
   return job;
 }
 
-Status DvrScene::draw(const Camera& camera, const DvrOptions& options, DvrFrame& frame, Context& ctx) const {
+Status DvrScene::draw(const Camera& camera, const DvrOptions& options, Frame& frame, Context& ctx) const {
   VOX_TRY(const DvrJob job, dvr_job(*this, camera, options));
-  const auto start = std::chrono::steady_clock::now();
-  VOX_CHECK(begin_frame(job, frame, ctx));
+  VOX_CHECK(frame.begin({.width = options.width, .height = options.height, .details = options.details}, ctx));
+  const auto start = Clock::now();
+  VOX_CHECK(blank_around(job, frame, ctx));
   if (volume_->dense() && is_direct(volume_->info())) {
     VOX_CHECK(draw_dense(*volume_->dense(), job, frame, ctx));
   } else if (volume_->info().format == VoxelFormat::float32) {
@@ -159,7 +153,7 @@ Status DvrScene::draw(const Camera& camera, const DvrOptions& options, DvrFrame&
   } else {
     VOX_CHECK(draw_bricks<uint16_t>(*volume_, job, frame, ctx));
   }
-  frame.seconds = std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
+  frame.seconds = seconds_since(start);
   if (volume_->svmm()) return volume_->svmm()->store().status();
   if (volume_->vq()) return volume_->vq()->store().status();
   return {};

@@ -54,13 +54,6 @@ struct DvrOptions {
   bool details = false;  ///< fill Frame::details: where the first sample that was seen is, samples as cells
 };
 
-/// A frame, and how many samples were taken for it. cells_visited: places looked at, each of up to 8 rays;
-/// blocks_touched: times that a brick was decoded. All counts depend on the picture, not on threads.
-struct DvrFrame : Frame {
-  uint64_t samples = 0;
-  uint64_t bricks_decoded = 0;  ///< places of bricks that were decoded, each counted once
-};
-
 /// A volume seen through a transfer function, for any number of pictures.
 class DvrScene {
  public:
@@ -69,9 +62,10 @@ class DvrScene {
   /// Samples on planes that are equally far apart, trilinear between voxel centres and clamped at the
   /// volume's edges, classified, lit, and blended front to back, the opacity being that of the true way from
   /// sample to sample; a ray ends at an opacity of 0.995. The pixels do not depend on ctx.threads,
-  /// options.skip and options.native, nor on how the volume is held. Errors: ErrorCode::usage where a ray
-  /// would need more than 2^23 samples; ErrorCode::input of a damaged file.
-  Status draw(const Camera& camera, const DvrOptions& options, DvrFrame& frame, Context& ctx) const;
+  /// options.skip and options.native, nor on how the volume is held; the counts not on ctx.threads. `frame`
+  /// is overwritten; its memory is used again. Errors: ErrorCode::usage where a ray would need more than 2^23
+  /// samples; ErrorCode::input of a damaged file; ErrorCode::limit.
+  Status draw(const Camera& camera, const DvrOptions& options, Frame& frame, Context& ctx) const;
 
   const DvrVolume& volume() const { return *volume_; }
   const TransferFunction& transfer() const { return transfer_; }

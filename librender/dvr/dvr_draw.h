@@ -6,8 +6,10 @@
 namespace voxkit::render {
 
 /// Fills the pixels and counts of a frame that was begun. Errors: those of interrupts and memory.
-Status draw_dense(const DenseGrid& grid, const DvrJob& job, DvrFrame& frame, Context& ctx);
+Status draw_dense(const DenseGrid& grid, const DvrJob& job, Frame& frame, Context& ctx);
 template <class T>
-Status draw_bricks(const DvrVolume& volume, const DvrJob& job, DvrFrame& frame, Context& ctx);
+Status draw_voxels(const DenseGrid& grid, const DvrJob& job, Frame& frame, Context& ctx);
+template <class T>
+Status draw_bricks(const DvrVolume& volume, const DvrJob& job, Frame& frame, Context& ctx);
 
 }  // namespace voxkit::render

@@ -15,8 +15,8 @@ struct DvrJob {
 
 /// Its pointers are those of the scene. Errors: those of DvrScene::draw before it draws.
 Result<DvrJob> dvr_job(const DvrScene& scene, const Camera& camera, const DvrOptions& options);
-/// Sets the size of a frame, its counts to 0, and the pixels that cannot see the volume.
-Status begin_frame(const DvrJob& job, DvrFrame& frame, Context& ctx);
+/// Sets the pixels of a frame that cannot see the volume.
+Status blank_around(const DvrJob& job, Frame& frame, Context& ctx);
 /// Whether rays may look into a volume in memory with 32-bit numbers of voxels.
 bool is_direct(const VolumeInfo& info);
 

@@ -71,7 +71,7 @@ class VqReader final : public BrickReader<T> {
   }
 
  private:
-  static constexpr uint32_t slots = 4096;
+  static constexpr uint32_t slots = remembered_bricks;
   struct Remembered {
     uint64_t id = vq::Reader<vq::MappedPools>::no_brick;
     std::array<T, vq::brick_voxels> values;

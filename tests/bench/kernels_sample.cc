@@ -154,7 +154,7 @@ void add_sample_kernels(bool quick) {
                                *transfer_preset("gray", ValueRange{0, 65535}), context()));
       DvrOptions options;
       options.width = options.height = quick ? 32 : 256;
-      DvrFrame frame;
+      Frame frame;
       uint64_t samples = 0;
       for (auto _ : state) {
         VOX_CHECK(scene.draw(Camera::orbit(30, 20, 1.8, 45), options, frame, context()));

@@ -7,9 +7,8 @@
 #include "libcolor/store.h"
 #include "librender/camera.h"
 #include "librender/cast/ray_cast.h"
-#include "librender/cast/surface_colors.h"
+#include "librender/device/device_grid.h"
 #include "tests/libcolor/scenes.h"
-#include "tests/librender/emulated_launch.h"
 
 namespace voxkit::render {
 namespace {
@@ -57,6 +56,8 @@ TEST(DagGrid, PicturesAreThoseOfTheVoxels) {
       const auto dense = DenseGrid::read(*decoded, f.ctx);
       ASSERT_TRUE(dense);
       const DagGrid grid(*volume);
+      const auto uploaded = DeviceGrid::upload(grid, *Backend::open(BackendKind::threads), f.ctx);
+      ASSERT_TRUE(uploaded);
       for (const double distance : {0.2, 0.9, 1.8})
         for (const double azimuth : {0.0, 33.0, 215.0}) {
           const Camera camera = Camera::orbit(azimuth, 20, distance, 45);
@@ -80,16 +81,16 @@ TEST(DagGrid, PicturesAreThoseOfTheVoxels) {
                   ASSERT_EQ(frame.details[i].voxel[a], expected.details[i].voxel[a]);
               }
             }
-          options.traversal = Traversal::path;
           // The kernel of the GPU, and colours looked up after it.
-          const auto view = (*volume)->store().dag((*volume)->container(), (*volume)->params());
-          ASSERT_TRUE(view);
-          Frame device = launch(DagCastView<Search::path>{*view}, grid.info(), camera, options);
-          ASSERT_TRUE(look_up_colors(**volume, device, f.ctx));
-          EXPECT_EQ(device.rays_hit, expected.rays_hit);
-          for (size_t i = 0; i < frame.pixels.size(); ++i) {
-            ASSERT_EQ(std::memcmp(&device.pixels[i], &expected.pixels[i], sizeof(Pixel)), 0);
-            ASSERT_EQ(std::memcmp(&device.details[i].voxel, &expected.details[i].voxel, 12), 0);
+          for (const Traversal traversal : {Traversal::path, Traversal::restart}) {
+            options.traversal = traversal;
+            Frame device;
+            ASSERT_TRUE((*uploaded)->cast(camera, options, device, f.ctx));
+            EXPECT_EQ(device.rays_hit, expected.rays_hit);
+            for (size_t i = 0; i < frame.pixels.size(); ++i) {
+              ASSERT_EQ(std::memcmp(&device.pixels[i], &expected.pixels[i], sizeof(Pixel)), 0);
+              ASSERT_EQ(std::memcmp(&device.details[i].voxel, &expected.details[i].voxel, 12), 0);
+            }
           }
         }
     }

@@ -1,4 +1,4 @@
-// The kernel of the GPU, block by block and thread by thread on the host, gives the pixels of the host's
+// The kernels of the GPU, on the backend that has threads in its place, give the pixels of the host's
 // renderer; so do all other ways to cast them.
 #include <gtest/gtest.h>
 
@@ -6,8 +6,11 @@
 #include <cstring>
 
 #include "formats/volume/readers.h"
+#include "librender/cast/cast_params.h"
+#include "librender/device/backend_run.h"
+#include "librender/device/device_grid.h"
 #include "librender/device/flat_pools.h"
-#include "tests/librender/emulated_launch.h"
+#include "librender/device/pixel_kernel.h"
 #include "tests/libsvmm/volumes.h"
 
 namespace voxkit::render {
@@ -16,32 +19,24 @@ namespace {
 using svmm::FlatPools;
 using svmm::test::context;
 
-/// A compressed volume as it is uploaded.
-class Uploaded {
- public:
-  explicit Uploaded(const svmm::Volume& volume) : view_(volume.store().view) {
-    const auto allocate = [&](uint64_t bytes) -> Result<std::byte*> {
-      levels_.push_back(std::make_unique<std::byte[]>(bytes));
-      return levels_.back().get();
-    };
-    const auto copy = [](std::byte* to, std::span<const std::byte> from) -> Status {
-      std::memcpy(to, from.data(), from.size());
-      return {};
-    };
-    auto pools = flatten(volume, allocate, copy);
-    EXPECT_TRUE(pools);
-    pools_ = *pools;
-  }
-  template <Search search>
-  SvmmView<FlatPools, search> view() const {
-    return {&view_, &pools_};
-  }
-
- private:
-  std::vector<std::unique_ptr<std::byte[]>> levels_;
-  svmm::View view_;
-  FlatPools pools_{};
-};
+std::shared_ptr<const Backend> threads() {
+  return *Backend::open(BackendKind::threads);
+}
+/// A volume as it is uploaded.
+template <class Grid>
+std::unique_ptr<const DeviceGrid> uploaded(const Grid& grid) {
+  static Context ctx = context();
+  auto device = DeviceGrid::upload(grid, threads(), ctx);
+  EXPECT_TRUE(device);
+  return std::move(*device);
+}
+Frame cast_on_device(const std::unique_ptr<const DeviceGrid>& device, const Camera& camera,
+                     CastOptions options, int workers = 2) {
+  Context ctx = context(workers);
+  Frame frame;
+  EXPECT_TRUE(device->cast(camera, options, frame, ctx));
+  return frame;
+}
 
 template <class Grid>
 Frame cast_on_host(const Grid& grid, const Camera& camera, CastOptions options, int threads) {
@@ -88,7 +83,7 @@ TEST(Device, EveryWayGivesThePixelsOfTheDenseVolumeOnTheWholePath) {
   const auto dense = read_all(**source);
   const auto volume = compress(**source, 100);
   const SvmmGrid svmm(volume);
-  const Uploaded uploaded(*volume);
+  const auto device_svmm = uploaded(svmm), device_dense = uploaded(*dense);
   const auto path = camera_path("thesis94", Camera::orbit(30, 20, 1.8, 45));
   ASSERT_TRUE(path);
   int64_t hit = 0, pixels = 0;
@@ -113,15 +108,16 @@ TEST(Device, EveryWayGivesThePixelsOfTheDenseVolumeOnTheWholePath) {
     options.traversal = Traversal::restart;
     const Frame restart = cast_on_host(svmm, camera, options, 2);
     ASSERT_EQ(differing(expected, restart), 0) << "restart";
-    const Frame device = launch(uploaded.view<Search::restart>(), svmm.info(), camera, options);
+    const Frame device = cast_on_device(device_svmm, camera, options);
     ASSERT_EQ(differing(expected, device), 0) << "device, restart";
     ASSERT_EQ(restart.cells_visited, device.cells_visited);
     ASSERT_EQ(restart.blocks_touched, device.blocks_touched);
     ASSERT_EQ(restart.bytes_touched, device.bytes_touched);
     options.traversal = Traversal::path;
-    ASSERT_EQ(differing(expected, launch(uploaded.view<Search::path>(), svmm.info(), camera, options)), 0)
-        << "device, path";
-    ASSERT_EQ(differing(expected, launch(dense->view(), svmm.info(), camera, options)), 0) << "device, dense";
+    for (const int workers : {1, 3})
+      ASSERT_EQ(differing(expected, cast_on_device(device_svmm, camera, options, workers)), 0)
+          << "device, path";
+    ASSERT_EQ(differing(expected, cast_on_device(device_dense, camera, options)), 0) << "device, dense";
   }
   if (std::getenv("VOXKIT_THESIS94"))
     std::printf("%lld pixels, %lld hit\n", static_cast<long long>(pixels), static_cast<long long>(hit));
@@ -134,7 +130,7 @@ TEST(Device, GivesTheHostsPixelsOfTransparentVolumesAndLevelsOfDetail) {
       auto source = open_builtin(name);
       const auto volume = compress(**source, quality);
       const SvmmGrid svmm(volume);
-      const Uploaded uploaded(*volume);
+      const auto device = uploaded(svmm);
       for (const Camera& camera : {Camera::orbit(30, 20, 1.8, 45), Camera::orbit(200, -50, 9, 30),
                                    Camera{{0.1, 0, 0}, {1, 0.3, 0.2}, 60}})
         for (const bool level_of_detail : {false, true}) {
@@ -146,9 +142,7 @@ TEST(Device, GivesTheHostsPixelsOfTransparentVolumesAndLevelsOfDetail) {
           options.traversal = Traversal::restart;
           options.level_of_detail = level_of_detail;
           const Frame expected = cast_on_host(svmm, camera, options, 2);
-          ASSERT_EQ(
-              differing(expected, launch(uploaded.view<Search::restart>(), svmm.info(), camera, options)), 0)
-              << name;
+          ASSERT_EQ(differing(expected, cast_on_device(device, camera, options)), 0) << name;
           options.native = false;
           ASSERT_EQ(differing(expected, cast_on_host(svmm, camera, options, 2)), 0) << name;
         }
@@ -164,24 +158,35 @@ TEST(Device, BaselineIsTheHosts) {
   options.details = true;
   options.traversal = Traversal::baseline;
   const Camera camera = Camera::orbit(30, 20, 1.8, 45);
-  EXPECT_EQ(differing(cast_on_host(*dense, camera, options, 2),
-                      launch(BaselineView{dense->view()}, dense->info(), camera, options)),
-            0);
+  EXPECT_EQ(
+      differing(cast_on_host(*dense, camera, options, 2), cast_on_device(uploaded(*dense), camera, options)),
+      0);
 }
 
 TEST(Device, MissingBlocksAreVoidThere) {
   auto source = open_builtin("menger:3");
   const auto volume = compress(**source, 100);
-  const Uploaded uploaded(*volume);
-  const auto whole = uploaded.view<Search::path>();
-  FlatPools pools = *whole.pools;
-  pools.levels[0].blocks /= 2;  // as if links led to blocks that are not there
-  const SvmmView<FlatPools, Search::path> damaged{whole.view, &pools};
+  const auto backend = threads();
+  Context ctx = context();
+  const auto blocks = upload_blocks(*volume, *backend, ctx);
+  ASSERT_TRUE(blocks);
+  FlatPools pools = blocks->pools;
   CastOptions options;
   options.width = options.height = 64;
-  const Camera camera = Camera::orbit(30, 20, 1.8, 45);
-  const Frame all = launch(whole, volume->info(), camera, options);
-  const Frame some = launch(damaged, volume->info(), camera, options);
+  const auto cast_blocks = [&] {
+    using View = SvmmView<FlatPools, Search::path>;
+    Frame frame;
+    EXPECT_TRUE(frame.begin({64, 64, true, true}, ctx));
+    const PixelKernel<View> kernel{*cast_params(volume->info(), Camera::orbit(30, 20, 1.8, 45), options),
+                                   View{&volume->store().view, &pools}, frame.pixels.data(),
+                                   frame.details.data(), frame.costs.data()};
+    EXPECT_TRUE(backend->run("casting", kernel.count(), kernel, ctx));
+    add_up(frame);
+    return frame;
+  };
+  const Frame all = cast_blocks();
+  pools.levels[0].blocks /= 2;  // as if links led to blocks that are not there
+  const Frame some = cast_blocks();
   EXPECT_LT(some.rays_hit, all.rays_hit);
   EXPECT_GT(some.rays_hit, 0u);
 }

@@ -1,21 +1,21 @@
-// The kernel of direct volume rendering for GPUs, warp by warp and lane by lane on the host, gives the pixels
-// of the host's renderer.
+// The kernels of direct volume rendering for GPUs, on the backend that has threads and vectors in place of
+// warps, give the pixels of the host's renderer.
 #include <gtest/gtest.h>
 
 #include <cstring>
 
 #include "formats/volume/readers.h"
+#include "librender/device/backend_run.h"
+#include "librender/device/device_dvr.h"
 #include "librender/device/vq_flat_pools.h"
 #include "librender/device/warp_kernel.h"
 #include "librender/dvr/dvr_job.h"
-#include "librender/dvr/dvr_lanes.h"
 #include "tests/libvq/volumes.h"
 
 namespace voxkit::render {
 namespace {
 
 using vq::test::context;
-using WarpLanes = VectorLanes<8, 4>;
 
 DvrScene scene_of(auto volume, const TransferFunction& transfer) {
   Context ctx = context();
@@ -25,59 +25,33 @@ DvrScene scene_of(auto volume, const TransferFunction& transfer) {
   EXPECT_TRUE(scene) << scene.error().what;
   return std::move(*scene);
 }
-DvrFrame draw_on_host(const DvrScene& scene, const Camera& camera, const DvrOptions& options) {
+Frame draw_on_host(const DvrScene& scene, const Camera& camera, const DvrOptions& options) {
   Context ctx = context();
-  DvrFrame frame;
+  Frame frame;
   const Status status = scene.draw(camera, options, frame, ctx);
   EXPECT_TRUE(status) << status.error().what;
   return frame;
 }
 
-/// A launch of one warp after the other.
-template <DvrGradient kind, class View>
-DvrFrame launch_kind(const DvrJob& job, const View& view) {
+std::shared_ptr<const Backend> threads() {
+  return *Backend::open(BackendKind::threads);
+}
+std::unique_ptr<const DeviceDvr> uploaded(const DvrScene& scene) {
   Context ctx = context();
-  DvrFrame frame;
-  EXPECT_TRUE(begin_frame(job, frame, ctx));
-  const CastParams& cast = job.params.cast;
-  const auto width = static_cast<size_t>(cast.right - cast.left),
-             height = static_cast<size_t>(cast.bottom - cast.top);
-  const int64_t warps = warps_of(cast, WarpLanes::width, WarpLanes::height);
-  std::vector<Pixel> pixels(width * height);
-  std::vector<PixelDetail> details(width * height);
-  std::vector<uint32_t> decoded(static_cast<size_t>(warps));
-  for (int64_t warp = 0; warp < warps; ++warp) {
-    WarpCache cache;
-    std::memset(&cache, 0xa5, sizeof cache);  // shared memory begins with anything
-    auto sampler = view.template sampler<WarpLanes>(cache);
-    draw_warp<WarpLanes, kind>(job.params, sampler, warp, {pixels.data(), details.data(), decoded.data()});
-  }
-  for (size_t i = 0; i < pixels.size(); ++i) {
-    const size_t at = (static_cast<size_t>(cast.top) + i / width) * static_cast<size_t>(cast.width) +
-                      static_cast<size_t>(cast.left) + i % width;
-    frame.pixels[at] = pixels[i];
-    frame.details[at] = details[i];
-    frame.samples += details[i].cells;
-    frame.rays_hit += details[i].voxel[0] >= 0;
-  }
-  for (const uint32_t count : decoded) frame.blocks_touched += count;
+  auto device = DeviceDvr::upload(scene, threads(), ctx);
+  EXPECT_TRUE(device) << device.error().what;
+  return std::move(*device);
+}
+Frame draw_on_device(const std::unique_ptr<const DeviceDvr>& device, const Camera& camera,
+                     const DvrOptions& options, int workers = 2) {
+  Context ctx = context(workers);
+  Frame frame;
+  const Status status = device->draw(camera, options, frame, ctx);
+  EXPECT_TRUE(status) << status.error().what;
   return frame;
 }
-template <class View>
-DvrFrame launch(const DvrScene& scene, const View& view, const Camera& camera, const DvrOptions& options) {
-  const auto job = dvr_job(scene, camera, options);
-  EXPECT_TRUE(job);
-  switch (job->gradient) {
-    case DvrGradient::none:
-      return launch_kind<DvrGradient::none>(*job, view);
-    case DvrGradient::analytic:
-      return launch_kind<DvrGradient::analytic>(*job, view);
-    default:
-      return launch_kind<DvrGradient::neighbour>(*job, view);
-  }
-}
 
-void expect_same(const DvrFrame& a, const DvrFrame& b) {
+void expect_same(const Frame& a, const Frame& b) {
   ASSERT_EQ(a.pixels.size(), b.pixels.size());
   for (size_t i = 0; i < a.pixels.size(); ++i) {
     ASSERT_EQ(0, std::memcmp(&a.pixels[i], &b.pixels[i], sizeof(Pixel))) << "pixel " << i;
@@ -86,29 +60,6 @@ void expect_same(const DvrFrame& a, const DvrFrame& b) {
   EXPECT_EQ(a.rays_hit, b.rays_hit);
   EXPECT_EQ(a.samples, b.samples);
 }
-
-/// A VQ file as it is uploaded.
-class Uploaded {
- public:
-  explicit Uploaded(const vq::Volume& volume) {
-    const auto allocate = [&](uint64_t bytes) -> Result<std::byte*> {
-      memory_.push_back(std::make_unique<std::byte[]>(bytes));
-      return memory_.back().get();
-    };
-    const auto copy = [](std::byte* to, std::span<const std::byte> from) -> Status {
-      std::memcpy(to, from.data(), from.size());
-      return {};
-    };
-    const auto pools = flatten(volume, allocate, copy);
-    EXPECT_TRUE(pools);
-    const Index3& dims = volume.info().dims;
-    view = {volume.view(), *pools, code_values(volume), {dims.x, dims.y, dims.z}};
-  }
-  WarpVq<FlatVqPools> view{};
-
- private:
-  std::vector<std::unique_ptr<std::byte[]>> memory_;
-};
 
 DvrOptions small() {
   DvrOptions options;
@@ -125,8 +76,8 @@ TransferFunction ramp(double lo, double hi) {
 const Camera cameras[] = {Camera::orbit(210, 15, 1.4, 45), Camera{{0.1, 0, 0.05}, {1, 0.3, 0.2}, 60}};
 
 /// All ways to draw a scene.
-template <class View>
-void expect_the_hosts(const DvrScene& scene, const View& view) {
+void expect_the_hosts(const DvrScene& scene) {
+  const auto device = uploaded(scene);
   for (const Camera& camera : cameras)
     for (const bool lit : {false, true})
       for (const auto kind : {Gradient::analytic, Gradient::neighbour})
@@ -136,9 +87,9 @@ void expect_the_hosts(const DvrScene& scene, const View& view) {
           options.gradient = kind;
           options.skip = skip;
           options.modulate = lit && skip ? 4 : 0;
-          const DvrFrame expected = draw_on_host(scene, camera, options);
+          const Frame expected = draw_on_host(scene, camera, options);
           EXPECT_GT(expected.rays_hit, 100u);
-          expect_same(launch(scene, view, camera, options), expected);
+          expect_same(draw_on_device(device, camera, options), expected);
           if (testing::Test::HasFatalFailure()) return;
         }
 }
@@ -152,12 +103,16 @@ TEST(DvrDevice, GivesTheHostsPixelsOfDenseVolumes) {
     ASSERT_TRUE(grid);
     const double top = (1 << bits) - 1;
     const DvrScene scene = scene_of(*grid, ramp(0.4 * top, 0.9 * top));
-    const std::byte* const voxels = (*grid)->view().voxels;
-    if (bits == 8)
-      expect_the_hosts(scene, WarpDense<uint8_t>{voxels, {23, 18, 29}});
-    else
-      expect_the_hosts(scene, WarpDense<uint16_t>{voxels, {23, 18, 29}});
+    expect_the_hosts(scene);
   }
+  const VolumeInfo info = voxkit::test::scalar_info({23, 18, 29}, SampleType::f32);
+  voxkit::test::MemorySource source(info, vq::test::make_voxels(info, vq::test::Content::scan, 8, 7));
+  Context ctx = context();
+  const auto range = measure_range(source, ctx);
+  ASSERT_TRUE(range);
+  const auto grid = DenseGrid::read(source, ctx);
+  ASSERT_TRUE(grid);
+  expect_the_hosts(scene_of(*grid, ramp(range->lo, range->hi)));
 }
 
 TEST(DvrDevice, GivesTheHostsPixelsOfBothCodebooksAndMappings) {
@@ -175,8 +130,7 @@ TEST(DvrDevice, GivesTheHostsPixelsOfBothCodebooksAndMappings) {
         const auto volume = encoded.open();
         const double top = (1 << bits) - 1;
         const DvrScene scene = scene_of(volume, ramp(0.4 * top, 0.9 * top));
-        const Uploaded uploaded(*volume);
-        expect_the_hosts(scene, uploaded.view);
+        expect_the_hosts(scene);
         ASSERT_FALSE(HasFatalFailure()) << bits << " bits, seed " << seed;
       }
 }
@@ -193,11 +147,10 @@ TEST(DvrDevice, GivesTheHostsPixelsOfQuantisedFloatsAndThinVolumes) {
     const auto encoded = vq::test::encode_to_memory(source, options);
     const auto volume = encoded.open();
     const DvrScene scene = scene_of(volume, ramp(range->lo, range->hi));
-    const Uploaded uploaded(*volume);
     DvrOptions drawn = small();
-    const DvrFrame expected = draw_on_host(scene, cameras[0], drawn);
+    const Frame expected = draw_on_host(scene, cameras[0], drawn);
     EXPECT_GT(expected.rays_hit, 20u);
-    expect_same(launch(scene, uploaded.view, cameras[0], drawn), expected);
+    expect_same(draw_on_device(uploaded(scene), cameras[0], drawn), expected);
   }
 }
 
@@ -206,12 +159,11 @@ TEST(DvrDevice, WarpsKeepWhatTheyDecoded) {
   const auto encoded = vq::test::encode_to_memory(**source);
   const auto volume = encoded.open();
   const DvrScene scene = scene_of(volume, ramp(90, 210));
-  const Uploaded uploaded(*volume);
   DvrOptions options = small();
-  const DvrFrame frame = launch(scene, uploaded.view, cameras[0], options);
-  // A brick is crossed by several samples of several rays.
+  const Frame frame = draw_on_device(uploaded(scene), cameras[0], options);
+  // A brick is crossed by several samples of several rays: of the eight of a group, on threads.
   EXPECT_GT(frame.blocks_touched, 1000u);
-  EXPECT_LT(frame.blocks_touched * 20, frame.samples);
+  EXPECT_LT(frame.blocks_touched * 8, frame.samples);
 }
 
 TEST(DvrDevice, DamagedChunksAndCodewordsAreNotReadPast) {
@@ -222,32 +174,57 @@ TEST(DvrDevice, DamagedChunksAndCodewordsAreNotReadPast) {
     const auto encoded = vq::test::encode_to_memory(**source, encoding);
     const auto volume = encoded.open();
     const DvrScene scene = scene_of(volume, ramp(90, 210));
+    const auto backend = threads();
+    Context ctx = context();
     // As if what was uploaded had changed after it was checked.
     uint32_t random = 1;
     for (int round = 0; round < 20; ++round) {
-      std::vector<std::vector<std::byte>> memory;
-      const auto allocate = [&](uint64_t bytes) -> Result<std::byte*> {
-        return memory.emplace_back(bytes).data();
-      };
-      const auto copy = [&](std::byte* to, std::span<const std::byte> from) -> Status {
-        std::memcpy(to, from.data(), from.size());
-        return {};
-      };
-      const auto pools = flatten(*volume, allocate, copy);
-      ASSERT_TRUE(pools);
-      for (size_t i = 0; i < memory.size();
-           i += 2)  // chunks; between them are the tables of where they begin
-        for (std::byte& byte : memory[i]) {
+      const auto flat = upload_chunks(*volume, *backend, ctx);
+      ASSERT_TRUE(flat);
+      for (const auto& chunk : flat->chunks)
+        for (std::byte& byte : std::span(chunk.data(), chunk.size())) {
           random = random * 1664525 + 1013904223;
           if (random >> 24 < 16) byte = static_cast<std::byte>(random >> 16);
         }
-      const WarpVq<FlatVqPools> view{volume->view(), *pools, code_values(*volume), {24, 24, 24}};
       DvrOptions options = small();
       options.skip = false;
-      const DvrFrame frame = launch(scene, view, cameras[0], options);
+      const auto job = dvr_job(scene, cameras[0], options);
+      ASSERT_TRUE(job);
+      Frame frame;
+      ASSERT_TRUE(frame.begin({options.width, options.height, true, true}, ctx));
+      const CastParams& cast = job->params.cast;
+      const auto at = cast.top * cast.width;
+      using View = WarpVq<FlatVqPools>;
+      const WarpKernel<DvrGradient::analytic, View> kernel{
+          job->params, View{volume->view(), flat->pools, code_values(*volume), {24, 24, 24}},
+          WarpPicture{frame.pixels.data() + at, frame.details.data() + at, frame.costs.data() + at}};
+      ASSERT_TRUE(backend->run_groups("rendering", kernel, ctx));
+      ASSERT_TRUE(blank_around(*job, frame, ctx));
       for (const Pixel& pixel : frame.pixels) ASSERT_TRUE(pixel.colour[3] >= 0 && pixel.colour[3] <= 1);
     }
   }
+}
+
+/// Chunks that are all missing.
+struct NoPools {
+  static vq::Bytes offsets(uint64_t) { return {}; }
+  static vq::Bytes addresses(uint64_t) { return {}; }
+  static vq::Bytes codebook(uint64_t) { return {}; }
+};
+TEST(DvrDevice, AnEmptySlotIsNoBrick) {
+  using Lanes = PortableLanes;
+  WarpCache cache;
+  std::memset(&cache, 0xa5, sizeof cache);
+  const int64_t dims[3] = {8, 8, 8};
+  const vq::View view;
+  const NoPools pools;
+  WarpBricks<Lanes, NoPools> bricks(view, pools, {.base = 7, .step = 1, .most = 255, .is_float = false}, dims,
+                                    cache);
+  DvrPlaces<Lanes> places{};
+  Lanes::Real corners[8];
+  bricks.fetch(places, Lanes::all(-1), corners);
+  for (const auto& corner : corners)
+    for (int i = 0; i < Lanes::count; ++i) EXPECT_EQ(corner[i], 7) << "what was in the cache";
 }
 
 }  // namespace

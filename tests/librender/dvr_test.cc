@@ -35,10 +35,10 @@ DvrScene scene_of(std::shared_ptr<T> volume, const TransferFunction& transfer) {
   EXPECT_TRUE(scene) << scene.error().what;
   return std::move(*scene);
 }
-DvrFrame draw(const DvrScene& scene, const Camera& camera, DvrOptions options, int threads = 2) {
+Frame draw(const DvrScene& scene, const Camera& camera, DvrOptions options, int threads = 2) {
   Context ctx = context(threads);
   options.details = true;
-  DvrFrame frame;
+  Frame frame;
   const Status status = scene.draw(camera, options, frame, ctx);
   EXPECT_TRUE(status) << status.error().what;
   return frame;
@@ -57,7 +57,7 @@ TransferFunction ramp(double lo, double hi) {
 }
 
 /// Every pixel, and every count of samples that skipping may not change.
-void expect_same(const DvrFrame& a, const DvrFrame& b) {
+void expect_same(const Frame& a, const Frame& b) {
   ASSERT_EQ(a.pixels.size(), b.pixels.size());
   EXPECT_EQ(0, std::memcmp(a.pixels.data(), b.pixels.data(), a.pixels.size() * sizeof(Pixel)));
   EXPECT_EQ(a.rays_hit, b.rays_hit);
@@ -176,7 +176,7 @@ TEST(Dvr, IsThePlainRenderer) {
         DvrOptions options = small(0.37);
         options.lit = lit;
         const Camera camera = Camera::orbit(33, 21, 1.7, 40);
-        const DvrFrame frame = draw(scene_of(grid, transfer), camera, options);
+        const Frame frame = draw(scene_of(grid, transfer), camera, options);
         const Reference reference(*grid, transfer, camera, options);
         EXPECT_GT(frame.rays_hit, 300u);
         double worst = 0, sum = 0;
@@ -223,14 +223,14 @@ TEST(Dvr, IsTheSameFromEveryFormSkippedOrNotOnAnyMachine) {
           DvrOptions options = small();
           options.gradient = kind;
           options.modulate = modulate;
-          const DvrFrame expected = draw(plain, camera, options);
+          const Frame expected = draw(plain, camera, options);
           EXPECT_GT(expected.rays_hit, 100u);
           for (const DvrScene& scene : others) expect_same(draw(scene, camera, options, 3), expected);
           options.native = false;
           expect_same(draw(plain, camera, options, 1), expected);
           expect_same(draw(others[0], camera, options, 1), expected);
           options.skip = false;
-          const DvrFrame all = draw(plain, camera, options);
+          const Frame all = draw(plain, camera, options);
           expect_same(all, expected);
           EXPECT_GE(all.samples, expected.samples);
           expect_same(draw(others[0], camera, options), expected);
@@ -249,7 +249,7 @@ TEST(Dvr, FloatsAndThinVolumes) {
     const DvrScene plain = scene_of(dense(source), transfer),
                    compressed = scene_of(svmm::test::encode_to_memory(source, params).open(), transfer);
     const Camera camera = Camera::orbit(20, 30, 1.5, 45);
-    const DvrFrame expected = draw(plain, camera, small());
+    const Frame expected = draw(plain, camera, small());
     expect_same(draw(compressed, camera, small()), expected);
   }
 }
@@ -265,7 +265,7 @@ TEST(Dvr, NoNumberAndInfinityShowNothingAndBreakNothing) {
   for (const auto kind : {Gradient::analytic, Gradient::neighbour}) {
     DvrOptions options = small();
     options.gradient = kind;
-    const DvrFrame frame = draw(scene, Camera::orbit(20, 30, 1.5, 45), options);
+    const Frame frame = draw(scene, Camera::orbit(20, 30, 1.5, 45), options);
     EXPECT_GT(frame.rays_hit, 100u);
     for (const Pixel& pixel : frame.pixels)
       for (const float c : pixel.colour) ASSERT_TRUE(c >= 0 && c <= 1.5f) << c;
@@ -284,7 +284,7 @@ TEST(Dvr, OpacityDoesNotDependOnTheStepOrTheAngle) {
   for (const double step : {0.05, 0.25}) {
     DvrOptions options = small(step);
     options.lit = false;
-    const DvrFrame frame = draw(scene, camera, options);
+    const Frame frame = draw(scene, camera, options);
     const Pixel& middle = frame.pixels[static_cast<size_t>(26 * 75 + 37)];
     EXPECT_NEAR(middle.colour[3], 1 - std::exp2(-8.0), 0.004);
     EXPECT_NEAR(middle.distance, 2.5, step / 8 + 1e-6);
@@ -296,9 +296,9 @@ TEST(Dvr, SkippingLooksAtLittle) {
   const auto volume = vq::test::encode_to_memory(**source).open();
   const DvrScene scene = scene_of(volume, ramp(250, 255));
   DvrOptions options = small();
-  const DvrFrame skipped = draw(scene, Camera::orbit(20, 30, 1.5, 45), options);
+  const Frame skipped = draw(scene, Camera::orbit(20, 30, 1.5, 45), options);
   options.skip = false;
-  const DvrFrame all = draw(scene, Camera::orbit(20, 30, 1.5, 45), options);
+  const Frame all = draw(scene, Camera::orbit(20, 30, 1.5, 45), options);
   expect_same(skipped, all);
   EXPECT_LT(skipped.samples * 2, all.samples);
   EXPECT_LT(skipped.cells_visited * 2, all.cells_visited);
@@ -318,7 +318,7 @@ TEST(Dvr, BricksOfWhichNothingIsSeenAreNotDecoded) {
                  plain = scene_of(dense(source), ramp(100, 250));
   for (const double azimuth : {30.0, 90.0, 200.0, 270.0}) {
     const Camera camera = Camera::orbit(azimuth, 20, 1.5, 45);
-    const DvrFrame frame = draw(scene, camera, small());
+    const Frame frame = draw(scene, camera, small());
     expect_same(frame, draw(plain, camera, small()));
     EXPECT_EQ(frame.bricks_decoded, 2u) << azimuth;  // the second one has both kinds, and nothing at its end
     DvrOptions options = small();
@@ -335,7 +335,7 @@ TEST(Dvr, NarrowFieldsOfViewHaveTheGradientsOfCells) {
   const DvrScene scene = scene_of(dense(**source), ramp(20, 255));
   Camera camera = Camera::orbit(33, 21, 1.7, 1e-4);
   DvrOptions options = small();
-  const DvrFrame expected = draw(scene, camera, options);
+  const Frame expected = draw(scene, camera, options);
   EXPECT_EQ(expected.rays_hit, 75u * 53);
   options.gradient = Gradient::neighbour;
   expect_same(draw(scene, camera, options), expected);
@@ -350,7 +350,7 @@ TEST(Dvr, ColoursAndTooManySamplesAreRefused) {
   auto needle = voxkit::test::scalar_info({2, 2, 65536}, SampleType::u8);
   needle.affine = Affine::plain({0.01, 1, 1}, needle.affine.origin);
   voxkit::test::MemorySource thin(needle, std::vector<std::byte>(4 * 65536));
-  DvrFrame frame;
+  Frame frame;
   const Status status =
       scene_of(dense(thin), ramp(1, 2)).draw(Camera::orbit(0, 0, 2, 45), small(0.1), frame, ctx);
   ASSERT_FALSE(status);
@@ -374,7 +374,7 @@ TEST(Dvr, TheUnitOfValuesDoesNotMatter) {
       DvrOptions options = small();
       options.gradient = gradient;
       options.modulate = modulate;
-      std::optional<DvrFrame> plain;
+      std::optional<Frame> plain;
       for (const int power : {0, -110, -60, 60, 110}) {
         std::vector<float> scaled = values;
         for (float& v : scaled) v = std::ldexp(v, power);
@@ -383,11 +383,13 @@ TEST(Dvr, TheUnitOfValuesDoesNotMatter) {
         Context ctx = context();
         const auto ranges = BrickRanges::of(*grid, ctx);
         ASSERT_TRUE(ranges);
-        const DvrFrame frame = draw(scene_of(grid, *transfer_preset("gray", ranges->all())),
-                                    Camera::orbit(30, 20, 1.5, 40), options);
-        if (!plain) plain = frame;
+        Frame frame = draw(scene_of(grid, *transfer_preset("gray", ranges->all())),
+                           Camera::orbit(30, 20, 1.5, 40), options);
         EXPECT_GT(frame.rays_hit, 1000u) << power;
-        expect_same(frame, *plain);
+        if (plain)
+          expect_same(frame, *plain);
+        else
+          plain = std::move(frame);
       }
     }
 }
@@ -400,7 +402,7 @@ TEST(Dvr, WhatIsNoNumberIsVoidAndChangesNothingElse) {
   const auto plain_source = voxkit::test::volume(info, values);
   Context ctx = context();
   const ValueRange range = BrickRanges::of(*dense(*plain_source), ctx)->all();
-  std::vector<DvrFrame> frames;
+  std::vector<Frame> frames;
   for (const float odd : {inf, -inf, std::numeric_limits<float>::quiet_NaN()}) {
     for (size_t i = 7; i < values.size(); i += 150) values[i] = odd;
     const auto source = voxkit::test::volume(info, values);

@@ -189,7 +189,7 @@ std::vector<Pixel> draw(const std::shared_ptr<const DvrVolume>& volume, const Lo
   const TransferFunction transfer =
       look.transfer ? *look.transfer : *transfer_preset("gray", volume->ranges().all());
   const DvrScene scene = must(DvrScene::create(volume, transfer, ctx));
-  DvrFrame frame;
+  Frame frame;
   must(scene.draw(Camera::orbit(30, 20, 1.5, 40), look.options, frame, ctx));
   return frame.pixels;
 }

@@ -1,0 +1,7 @@
+#include "librender/dvr/draw_bricks.h"
+
+namespace voxkit::render {
+
+template Status draw_bricks<uint16_t>(const DvrVolume&, const DvrJob&, Frame&, Context&);
+
+}  // namespace voxkit::render
