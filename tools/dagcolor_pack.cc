@@ -17,7 +17,7 @@ struct Options {
   std::string input, output, tiles;
   SurfaceOptions surface;
   std::string kind = "thin", codec = "vws", image_curve = "morton", curve = "morton", colors = "leaf",
-              counts = "node", space = "srgb";
+              counts = "node", space = "srgb", emissive = "add";
   color::Options encoder;
   std::optional<uint32_t> palette;
   bool verify = false;
@@ -34,6 +34,10 @@ void declare(CommandLine& line, Options& o) {
   line.option("--surface", "KIND",
               "Of a mesh: thin: no more voxels than make it tight; conservative: all that it touches (thin)",
               one_of(o.kind, {"thin", "conservative"}));
+  line.option("--emissive", "HOW", "Of a mesh: light that it emits: add: to its colors; drop (add)",
+              one_of(o.emissive, {"add", "drop"}));
+  line.option("--frame", "N", "Of an animated .vox model: which frame, from 0 (0)",
+              integer(o.surface.frame, 0, uint32_t{1} << 31));
   line.option("--codec", "CODEC",
               "raw: 24 bits a colour; fws, vws: blocks with weights of fixed and of variable size; bc1, bc7, "
               "astc: images, as textures, of 4, 8 and 0.89 to 8 bits a colour; palette: indices into a "
@@ -105,7 +109,7 @@ int64_t resolution_of(const VolumeInfo& info) {
   return std::max({info.dims.x, info.dims.y, info.dims.z});
 }
 
-Json json_of(const Encoding& encoding, const Run& run, const color::Report& report,
+Json json_of(const Encoding& encoding, const Run& run, const color::Report& report, const Options& o,
              const std::optional<color::SurfaceDiff>& diff) {
   const color::Params& p = report.params;
   Json json = encoding_json(encoding, run, params_json(p));
@@ -115,6 +119,7 @@ Json json_of(const Encoding& encoding, const Run& run, const color::Report& repo
   json.set("color_bits_per_voxel", 8 * static_cast<double>(p.color_bytes) /
                                        static_cast<double>(std::max<uint64_t>(p.leaf_voxels, 1)));
   json.set("geometry_bytes", p.dag_bytes).set("grmse", p.grmse).set("max_distance", report.most_error);
+  json.set("emissive", o.emissive);
   json.set("build_seconds", report.build_seconds).set("color_seconds", report.color_seconds);
   if (diff)
     json.set("rmse", diff->rmse).set("psnr_db", diff->psnr_db).set("max_abs_error", diff->max_abs_error);
@@ -128,6 +133,7 @@ Result<TiledSurface> open_what(const Options& o, const color::Options& options, 
     return open_tiled(o.input, o.tiles, options, ctx);
   }
   SurfaceOptions surface = o.surface;
+  surface.emission = o.emissive == "add";
   surface.kind = o.kind == "thin" ? color::SurfaceKind::thin : color::SurfaceKind::conservative;
   TiledSurface opened;
   VOX_TRY(opened.source, open_surface(o.input, surface, ctx));
@@ -141,6 +147,8 @@ Result<int> work(const Options& o, Run& run) {
   run.stage("read");
   VOX_TRY(TiledSurface opened, open_what(o, options, run.ctx));
   const VolumeInfo info = opened.source->info();
+  const std::vector<std::string> notes = opened.source->notes();
+  const bool emits = opened.source->emits();
   VOX_TRY(auto out, OutputFile::create(o.output, run.options.force));
   run.stage("encode");
   const double start = run.seconds();
@@ -148,6 +156,9 @@ Result<int> work(const Options& o, Run& run) {
                                           *opened.source, options, opened.stored,
                                           [&](auto bytes) { return out->write(bytes); }, run.ctx));
   const color::Params& p = report.params;
+  if (p.leaf_voxels == 0)
+    return bad_input(o.input,
+                     "nothing is left of it: expected voxels that are not void, at least half opaque");
   const Encoding encoding{o.input, o.output, info, out->position(), run.seconds() - start, {}};
 
   std::optional<color::SurfaceDiff> diff;
@@ -168,12 +179,16 @@ Result<int> work(const Options& o, Run& run) {
     }
   }
   VOX_CHECK(out->commit());
-  if (run.options.json) VOX_CHECK(print(json_of(encoding, run, report, diff).text()));
+  if (!run.options.quiet)
+    for (const std::string& note : notes) fmt::print(stderr, "{}: {}: {}\n", run.tool, o.input, note);
+  if (run.options.json) VOX_CHECK(print(json_of(encoding, run, report, o, diff).text()));
   if (!run.options.quiet && !run.options.json)
     fmt::print(
-        stderr, "{}: {} voxels in {} bytes: geometry {}, colors {} ({:.4g} %), error {:.4g}, in {:.2f} s{}\n",
-        o.output, p.leaf_voxels, encoding.file_bytes, p.dag_bytes, p.color_bytes, color_percent(p), p.grmse,
-        encoding.seconds, diff ? fmt::format(", greatest error {:.4g}", diff->max_distance) : "");
+        stderr,
+        "{}: {} voxels in {} bytes: geometry {}, colors {} ({:.4g} %){}, error {:.4g}, in {:.2f} s{}\n",
+        o.output, p.leaf_voxels, encoding.file_bytes, p.dag_bytes, p.color_bytes, color_percent(p),
+        emits ? ", emission added" : "", p.grmse, encoding.seconds,
+        diff ? fmt::format(", greatest error {:.4g}", diff->max_distance) : "");
   return 0;
 }
 

@@ -2,6 +2,7 @@
 
 #include <fmt/format.h>
 
+#include <algorithm>
 #include <charconv>
 #include <cstdlib>
 #include <map>
@@ -111,10 +112,19 @@ struct Model {
 enum class Kind { transform, group, shape };
 struct Node {
   Kind kind = Kind::group;
-  Transform transform;
+  std::vector<Transform> transforms;  ///< of key frames
   uint32_t layer = 0;
   bool hidden = false;
-  std::vector<uint32_t> children;  ///< nodes; of a shape, models
+  std::vector<uint32_t> children;  ///< nodes; of a shape, models, one a key frame
+  std::vector<uint32_t> frames;    ///< the numbers of key frames
+
+  /// The key frame that counts at a frame: the last one up to there, else the first.
+  size_t key_at(uint32_t frame) const {
+    size_t best = 0;
+    for (size_t i = 1; i < frames.size(); ++i)
+      if (frames[i] <= frame && (frames[best] > frame || frames[i] >= frames[best])) best = i;
+    return best;
+  }
 };
 
 /// The palette of files without one: a cube of six steps a channel, then ramps of red, green, blue and grey.
@@ -137,8 +147,8 @@ std::array<Color, 256> default_palette() {
 
 class File {
  public:
-  File(Bytes bytes, const std::string& name, Context& ctx)
-      : reader_(bytes, 0, name), name_(name), ctx_(ctx) {}
+  File(Bytes bytes, const std::string& name, Context& ctx, uint32_t frame)
+      : reader_(bytes, 0, name), name_(name), ctx_(ctx), frame_(frame) {}
 
   Result<VoxelScene> read() {
     VOX_TRY(const uint32_t magic, reader_.number());
@@ -154,15 +164,35 @@ class File {
     VOX_TRY(Reader chunks, reader_.part(children));
     while (chunks.left() > 0) VOX_CHECK(read_chunk(chunks));
     if (models_.empty()) return bad_input(name_, "no model: expected chunks SIZE and XYZI");
+    const uint64_t frames = count_frames();
+    if (frame_ >= frames)
+      return fail(ErrorCode::usage, name_,
+                  fmt::format("--frame {}: there are {}: expected 0 to {}", frame_, frames, frames - 1));
     if (nodes_.empty()) {
-      for (uint32_t i = 0; i < models_.size(); ++i) VOX_CHECK(place_model(i, {}));
+      VOX_CHECK(place_model(frame_, {}));
     } else {
       VOX_CHECK(place_node(0, {}, 0));
     }
+    if (frames > 1)
+      scene_.notes.push_back(fmt::format("frame {} of {} is read: --frame N takes another", frame_, frames));
+    if (hidden_)
+      scene_.notes.push_back(fmt::format("dropped: {} parts of the scene that are hidden", hidden_));
+    int special = 0;
+    for (size_t i = 0; i < 256; ++i) special += used_[i] && special_[i];
+    if (special)
+      scene_.notes.push_back(fmt::format("dropped: materials of {} colors that are glass or shine", special));
     return std::move(scene_);
   }
 
  private:
+  uint64_t count_frames() const {
+    if (nodes_.empty()) return models_.size();
+    uint64_t frames = 1;
+    for (const auto& [id, node] : nodes_)
+      for (const uint32_t frame : node.frames) frames = std::max<uint64_t>(frames, uint64_t{frame} + 1);
+    return frames;
+  }
+
   Status read_chunk(Reader& chunks) {
     VOX_TRY(const uint32_t kind, chunks.number());
     VOX_TRY(const uint32_t own, chunks.number());
@@ -191,6 +221,11 @@ class File {
       VOX_TRY(const auto words, chunk.dictionary());
       if (const auto hidden = words.find("_hidden"); hidden != words.end())
         hidden_layers_[id] = hidden->second == "1";
+    } else if (kind == tag("MATL")) {
+      VOX_TRY(const uint32_t id, chunk.number());
+      VOX_TRY(const auto words, chunk.dictionary());
+      if (const auto type = words.find("_type"); type != words.end() && id < special_.size())
+        special_[id] = type->second != "_diffuse" && type->second != "_metal" && type->second != "_plastic";
     } else if (kind == tag("nTRN")) {
       return read_transform(chunk);
     } else if (kind == tag("nGRP") || kind == tag("nSHP")) {
@@ -202,7 +237,9 @@ class File {
       for (uint32_t i = 0; i < count; ++i) {
         VOX_TRY(const uint32_t child, chunk.number());
         node.children.push_back(child);
-        if (node.kind == Kind::shape) VOX_CHECK(chunk.dictionary());
+        if (node.kind != Kind::shape) continue;
+        VOX_TRY(const auto words, chunk.dictionary());
+        VOX_CHECK(read_frame(words, i, node, chunk));
       }
       nodes_[id] = std::move(node);
     }
@@ -220,14 +257,29 @@ class File {
     VOX_CHECK(chunk.number());  // reserved
     VOX_TRY(node.layer, chunk.number());
     VOX_TRY(const uint32_t frames, chunk.number());
-    if (frames > 0) {
+    for (uint32_t i = 0; i < frames; ++i) {
       VOX_TRY(const auto frame, chunk.dictionary());
+      Transform& transform = node.transforms.emplace_back();
       if (const auto rotation = frame.find("_r"); rotation != frame.end())
-        VOX_CHECK(parse_rotation(rotation->second, node.transform, chunk));
+        VOX_CHECK(parse_rotation(rotation->second, transform, chunk));
       if (const auto shift = frame.find("_t"); shift != frame.end())
-        VOX_CHECK(parse_shift(shift->second, node.transform, chunk));
+        VOX_CHECK(parse_shift(shift->second, transform, chunk));
+      VOX_CHECK(read_frame(frame, i, node, chunk));
     }
     nodes_[id] = std::move(node);
+    return {};
+  }
+  /// The number of a key frame; without one, how many there are before.
+  static Status read_frame(const std::map<std::string_view, std::string_view>& words, uint32_t before,
+                           Node& node, const Reader& chunk) {
+    uint32_t number = before;
+    if (const auto said = words.find("_f"); said != words.end()) {
+      const std::string_view text = said->second;
+      const auto [end, error] = std::from_chars(text.data(), text.data() + text.size(), number);
+      if (error != std::errc() || end != text.data() + text.size())
+        return chunk.bad(fmt::format("frame \"{}\": expected a number", text));
+    }
+    node.frames.push_back(number);
     return {};
   }
   /// Bits 0 and 1: the column of the first row's entry, 2 and 3: that of the second's, 4 to 6: signs.
@@ -264,18 +316,19 @@ class File {
       return bad_input(name_, fmt::format("more than {} nodes to place", most_visits));
     const Node& node = found->second;
     if (const auto layer = hidden_layers_.find(node.layer);
-        node.hidden || (node.kind == Kind::transform && layer != hidden_layers_.end() && layer->second))
+        node.hidden || (node.kind == Kind::transform && layer != hidden_layers_.end() && layer->second)) {
+      ++hidden_;
       return {};
-    const Transform inner = node.kind == Kind::transform ? outer.after(node.transform) : outer;
-    for (const uint32_t child : node.children) {
-      if (node.kind != Kind::shape) {
-        VOX_CHECK(place_node(child, inner, depth + 1));
-      } else if (child < models_.size()) {
-        VOX_CHECK(place_model(child, inner));
-      } else {
-        return bad_input(name_, fmt::format("node {}: model {}: there are {}", id, child, models_.size()));
-      }
     }
+    if (node.kind == Kind::shape) {
+      for (const uint32_t model : node.children)
+        if (model >= models_.size())
+          return bad_input(name_, fmt::format("node {}: model {}: there are {}", id, model, models_.size()));
+      return node.children.empty() ? Status() : place_model(node.children[node.key_at(frame_)], outer);
+    }
+    const Transform inner =
+        node.transforms.empty() ? outer : outer.after(node.transforms[node.key_at(frame_)]);
+    for (const uint32_t child : node.children) VOX_CHECK(place_node(child, inner, depth + 1));
     return {};
   }
 
@@ -305,6 +358,7 @@ class File {
           return bad_input(name_,
                            fmt::format("model {}: a voxel at {}: expected within {}", number, v, furthest));
       const auto color = std::to_integer<size_t>(model.voxels[4 * i + 3]);
+      used_[color] = true;
       scene_.voxels.push_back(
           {{static_cast<int32_t>(at[0]), static_cast<int32_t>(at[2]), static_cast<int32_t>(-1 - at[1])},
            palette_[color]});
@@ -315,20 +369,22 @@ class File {
   Reader reader_;
   const std::string& name_;
   Context& ctx_;
+  uint32_t frame_;
   Place size_{};  ///< of the model whose voxels come next
   std::vector<Model> models_;
   std::array<Color, 256> palette_ = default_palette();
   std::map<uint32_t, Node> nodes_;
   std::map<uint32_t, bool> hidden_layers_;
-  uint64_t placed_ = 0, visited_ = 0;
+  std::array<bool, 256> special_{}, used_{};  ///< of colours: of another material; there are voxels of it
+  uint64_t placed_ = 0, visited_ = 0, hidden_ = 0;
   VoxelScene scene_;
 };
 
 }  // namespace
 
-Result<VoxelScene> read_magicavoxel(const std::string& path, Context& ctx) {
+Result<VoxelScene> read_magicavoxel(const std::string& path, Context& ctx, uint32_t frame) {
   VOX_TRY(const auto file, MappedFile::open(path));
-  return File(file->bytes(), file->name(), ctx).read();
+  return File(file->bytes(), file->name(), ctx, frame).read();
 }
 
 }  // namespace voxkit

@@ -18,13 +18,16 @@ namespace voxkit {
 /// counts. The axes are turned so that y points up, as renderers have it: x, z and -y of the file.
 struct VoxelScene {
   std::vector<ModelVoxel> voxels;
-  Reservation memory;  ///< of these, in ctx.memory
+  Reservation memory;              ///< of these, in ctx.memory
+  std::vector<std::string> notes;  ///< what the file says and voxels cannot, a sentence each
 };
 
-/// Reads version 150 and 200 files: sizes, voxels, palettes, and the scene's nodes with their first frames'
-/// translations and rotations; what is hidden is left out. Places are within 2^20 of the origin. Errors:
-/// ErrorCode::input with the byte where a rule is broken, ErrorCode::limit.
-Result<VoxelScene> read_magicavoxel(const std::string& path, Context& ctx);
+/// Reads version 150 and 200 files: sizes, voxels, palettes, and the scene's nodes with their translations
+/// and rotations; what is hidden is left out. `frame`, from 0: of an animation, whose key frames count until
+/// the next ones; several models without a scene are frames, too. Places are within 2^20 of the origin.
+/// Errors: ErrorCode::input with the byte where a rule is broken, ErrorCode::limit, ErrorCode::usage for a
+/// frame that is not there.
+Result<VoxelScene> read_magicavoxel(const std::string& path, Context& ctx, uint32_t frame = 0);
 
 /// A voxel and the number of its colour in a palette.
 struct IndexedVoxel {

@@ -8,7 +8,8 @@
 #include <map>
 #include <utility>
 
-#include "formats/mesh/mesh_module.h"
+#include "formats/mesh/gltf_scene.h"
+#include "formats/mesh/mesh_obj.h"
 #include "formats/mesh/mesh_parts.h"
 #include "formats/mesh/mesh_ply.h"
 #include "formats/names.h"
@@ -38,8 +39,25 @@ void bring_into_range(glm::vec4& color) {
 
 Result<MeshParts> read_parts(const std::string& path, Context& ctx) {
   if (has_ending(path, ".ply")) return read_ply(path, ctx);
-  VOX_TRY(const ModuleTable* const module, load_module({"mesh", "reading this mesh", "libassimp-dev"}, path));
-  return module->mesh->read(path, ctx);
+  if (has_ending(path, ".obj")) return read_obj(path, ctx);
+  return read_gltf(path, ctx);
+}
+
+/// Drops the points that are nowhere, and says how many.
+Status check_points(Mesh& mesh, const std::string& path) {
+  size_t kept = 0;
+  for (const MeshPoint point : mesh.points) {
+    if (point.material >= mesh.materials.size() || point.vertex >= mesh.positions.size())
+      return bad_input(path, "corrupt mesh: a point without its vertex or material");
+    const glm::vec2 uv = mesh.uvs.empty() ? glm::vec2(0) : mesh.uvs[point.vertex];
+    if (is_finite(mesh.positions[point.vertex]) && std::isfinite(uv.x) && std::isfinite(uv.y))
+      mesh.points[kept++] = point;
+  }
+  if (kept < mesh.points.size())
+    mesh.notes.push_back(fmt::format("{} of {} points are dropped: their coordinates are not finite",
+                                     mesh.points.size() - kept, mesh.points.size()));
+  mesh.points.resize(kept);
+  return {};
 }
 
 }  // namespace
@@ -53,6 +71,7 @@ bool is_mesh_name(const std::string& name) {
 Status check_mesh(Mesh& mesh, const std::string& path) {
   const size_t vertices = mesh.positions.size();
   if ((!mesh.uvs.empty() && mesh.uvs.size() != vertices) ||
+      (!mesh.emission_uvs.empty() && mesh.emission_uvs.size() != vertices) ||
       (!mesh.colors.empty() && mesh.colors.size() != vertices))
     return bad_input(path, "corrupt mesh: vertices without all of their attributes");
   const bool had_triangles = !mesh.triangles.empty();
@@ -72,22 +91,26 @@ Status check_mesh(Mesh& mesh, const std::string& path) {
                          fmt::format("corrupt mesh: triangle {}: a corner at ({}, {}, {}): expected finite "
                                      "coordinates",
                                      i, p.x, p.y, p.z));
-      if (!mesh.uvs.empty() && (!std::isfinite(mesh.uvs[v].x) || !std::isfinite(mesh.uvs[v].y)))
-        return bad_input(path,
-                         fmt::format("corrupt mesh: triangle {}: texture coordinates ({}, {}): expected "
-                                     "finite ones",
-                                     i, mesh.uvs[v].x, mesh.uvs[v].y));
+      for (const auto* uvs : {&mesh.uvs, &mesh.emission_uvs})
+        if (!uvs->empty() && (!std::isfinite((*uvs)[v].x) || !std::isfinite((*uvs)[v].y)))
+          return bad_input(path,
+                           fmt::format("corrupt mesh: triangle {}: texture coordinates ({}, {}): expected "
+                                       "finite ones",
+                                       i, (*uvs)[v].x, (*uvs)[v].y));
     }
     const auto& [a, b, c] = triangle.vertices;
     if (has_area(mesh.positions[a], mesh.positions[b], mesh.positions[c])) mesh.triangles[kept++] = triangle;
   }
   mesh.triangles.resize(kept);
+  VOX_CHECK(check_points(mesh, path));
   for (glm::vec4& color : mesh.colors) bring_into_range(color);
   for (MeshMaterial& material : mesh.materials) {
     bring_into_range(material.color);
     material.alpha_cutoff = within_one(material.alpha_cutoff);
+    for (int c = 0; c < 3; ++c)
+      material.emission[c] = material.emission[c] > 0 ? std::min(material.emission[c], 1e6f) : 0;
   }
-  if (kept == 0)
+  if (kept == 0 && mesh.points.empty())
     return bad_input(
         path, had_triangles ? "a mesh without triangles that have an area" : "a mesh without triangles");
   return {};
@@ -97,43 +120,67 @@ Status load_textures(MeshParts& parts, const std::string& path, Context& ctx) {
   Mesh& mesh = parts.mesh;
   std::vector<bool> used(mesh.materials.size());
   for (const MeshTriangle& triangle : mesh.triangles) used[triangle.material] = true;
+  for (const MeshPoint& point : mesh.points) used[point.material] = true;
   const std::string folder = std::filesystem::path(path).parent_path().string();
 
   const auto load = [&](const TextureReference& reference, const std::string& material) -> Result<Texture> {
-    if (!reference.bytes.empty()) return decode_texture(path, reference.bytes, ctx);
-    const std::string file = find_texture(folder, reference.name);
-    if (file.empty())
-      return bad_input(
-          path, fmt::format("material {}: its texture {} is missing: expected it beside the mesh", material,
-                            reference.name));
-    return read_texture(file, ctx);
+    Result<Texture> texture;
+    if (!reference.bytes.empty()) {
+      texture = decode_texture(path, reference.bytes, ctx);
+    } else {
+      const std::string file = find_texture(folder, reference.name);
+      if (file.empty())
+        return bad_input(
+            path, fmt::format("material {}: its texture {} is missing: expected it beside the mesh", material,
+                              reference.name));
+      texture = read_texture(file, ctx);
+    }
+    if (texture && (reference.base != 0 || reference.gain != 1))
+      adjust_colors(*texture, reference.base, reference.gain);
+    return texture;
   };
   // Embedded textures have names of their own.
+  const auto key_of = [](const TextureReference& r) {
+    return r.used() ? fmt::format("{}\n{} {} {}", r.name, r.base, r.gain, static_cast<int>(r.channel)) : "";
+  };
   std::map<std::pair<std::string, std::string>, int32_t> known;
+  const auto texture_of = [&](const TextureReference& color, const TextureReference& opacity,
+                              const std::string& material) -> Result<int32_t> {
+    auto [at, is_new] = known.try_emplace({key_of(color), key_of(opacity)}, 0);
+    if (!is_new) return at->second;
+    Texture texture;
+    if (color.used()) {
+      VOX_TRY(texture, load(color, material));
+    }
+    if (opacity.used()) {
+      VOX_TRY(const Texture mask, load(opacity, material));
+      if (!color.used()) {
+        VOX_TRY(texture, plain_texture(mask.width, mask.height, 0xffffffff, ctx));
+      }
+      set_opacity(texture, mask, opacity.channel);
+    }
+    at->second = static_cast<int32_t>(mesh.textures.size());
+    mesh.textures.push_back(std::move(texture));
+    return at->second;
+  };
+  int masks = 0;
   for (size_t i = 0; i < mesh.materials.size(); ++i) {
     const MeshParts::Maps& maps = parts.maps[i];
     MeshMaterial& material = mesh.materials[i];
-    if (!used[i] || (!maps.color.used() && !maps.opacity.used())) continue;
-    auto [at, is_new] = known.try_emplace({maps.color.name, maps.opacity.name}, 0);
-    if (is_new) {
-      Texture texture;
-      if (maps.color.used()) {
-        VOX_TRY(texture, load(maps.color, material.name));
+    if (used[i] && (maps.color.used() || maps.opacity.used())) {
+      VOX_TRY(material.texture, texture_of(maps.color, maps.opacity, material.name));
+      if (maps.alpha_from_texture && mesh.textures[static_cast<size_t>(material.texture)].has_alpha) {
+        material.alpha_mode = AlphaMode::mask;
+        ++masks;
       }
-      if (maps.opacity.used()) {
-        VOX_TRY(const Texture mask, load(maps.opacity, material.name));
-        if (!maps.color.used()) {
-          VOX_TRY(texture, plain_texture(mask.width, mask.height, 0xffffffff, ctx));
-        }
-        set_opacity(texture, mask);
-      }
-      at->second = static_cast<int32_t>(mesh.textures.size());
-      mesh.textures.push_back(std::move(texture));
     }
-    material.texture = at->second;
-    if (maps.alpha_from_texture && mesh.textures[static_cast<size_t>(at->second)].has_alpha)
-      material.alpha_mode = AlphaMode::mask;
+    if (used[i] && maps.emission.used() && material.emits()) {
+      VOX_TRY(material.emission_texture, texture_of(maps.emission, {}, material.name));
+    }
   }
+  if (masks)
+    mesh.notes.push_back(
+        fmt::format("opacity becomes yes or no: of {} materials whose textures have alpha", masks));
   return {};
 }
 

@@ -17,11 +17,17 @@ namespace voxkit {
 /// How a texture goes on outside of 0..1.
 enum class TextureWrap : uint8_t { repeat, mirror, clamp };
 
+/// What is seen between the middles of texels where these are larger than what looks.
+enum class TextureFilter : uint8_t {
+  linear,   ///< a mean of those around
+  nearest,  ///< the nearest one
+};
+
 /// What the alpha of a material means.
 enum class AlphaMode : uint8_t {
   opaque,  ///< nothing
   mask,    ///< there is a surface where alpha is at least the cut-off
-  blend,   ///< there is a surface where alpha is above 0
+  blend,   ///< how much of the surface is there
 };
 
 struct MeshMaterial {
@@ -29,13 +35,25 @@ struct MeshMaterial {
   glm::vec4 color{1, 1, 1, 1};  ///< linear light and alpha, 0..1; multiplies the texture
   int32_t texture = -1;         ///< index into Mesh::textures, or -1
   TextureWrap wrap_u = TextureWrap::repeat, wrap_v = TextureWrap::repeat;
+  TextureFilter filter = TextureFilter::linear;
   AlphaMode alpha_mode = AlphaMode::opaque;
   float alpha_cutoff = 0.5f;
+
+  glm::vec3 emission{0, 0, 0};    ///< linear light, 0 or more; multiplies its texture
+  int32_t emission_texture = -1;  ///< index into Mesh::textures, or -1
+  TextureWrap emission_wrap_u = TextureWrap::repeat, emission_wrap_v = TextureWrap::repeat;
+  TextureFilter emission_filter = TextureFilter::linear;
+  bool emits() const { return emission.r > 0 || emission.g > 0 || emission.b > 0; }
 };
 
 struct MeshTriangle {
   std::array<uint32_t, 3> vertices{};
   uint32_t material = 0;
+};
+
+/// A vertex that is seen itself.
+struct MeshPoint {
+  uint32_t vertex = 0, material = 0;
 };
 
 /// A scene in one coordinate system. The memory counts against ctx.memory, which must outlive the mesh.
@@ -44,20 +62,23 @@ struct Mesh {
   /// Texture coordinates of the vertices, or none: (0, 0) is the top left corner of a texture, (1, 1) the
   /// bottom right one. Finite.
   std::vector<glm::vec2> uvs;
+  std::vector<glm::vec2> emission_uvs;  ///< of emission textures; none: these go by `uvs`, too
   std::vector<glm::vec4> colors;        ///< of the vertices, or none: linear light and alpha, 0..1
   std::vector<MeshTriangle> triangles;  ///< all of them have an area
+  std::vector<MeshPoint> points;
   std::vector<MeshMaterial> materials;
   std::vector<Texture> textures;
+  std::vector<std::string> notes;  ///< what the file says and the mesh cannot, a sentence each
   std::vector<Reservation> memory;
 };
 
 /// Whether a name ends like a mesh: .obj, .gltf, .glb or .ply.
 bool is_mesh_name(const std::string& name);
 
-/// Reads a mesh: the triangles of all nodes of the scene in their places, polygons split, points and lines
-/// left out, triangles without area dropped. Base colours of .obj and colours of .ply and .obj vertices are
-/// taken as sRGB, those of glTF as linear light, as their specifications or usual writers have it. Materials
-/// of .obj whose texture or opacity map has alpha are masks with a cut-off of 0.5.
+/// Reads a mesh: the triangles and points of all nodes of the scene in their places, polygons split, lines
+/// left out, triangles without area dropped. Colours of .obj and .ply files are taken as sRGB, those of glTF
+/// as linear light, as their specifications or usual writers have it. Materials of .obj whose texture or
+/// opacity map has alpha are masks with a cut-off of 0.5.
 ///
 /// A .ply file without faces is no mesh but points (point_cloud.h): ErrorCode::input.
 ///

@@ -1,6 +1,8 @@
 // A mesh as its file has it, and the way from there to a Mesh.
 #pragma once
 
+#include <memory>
+#include <span>
 #include <string>
 #include <vector>
 
@@ -8,10 +10,16 @@
 
 namespace voxkit {
 
-/// A texture that a mesh uses: a file, or bytes in the mesh's own file.
+/// A texture that a mesh uses: a file, or bytes in the mesh's own files.
 struct TextureReference {
-  std::string name;              ///< as the mesh has it; for errors where it is embedded
-  std::vector<std::byte> bytes;  ///< of an embedded PNG or JPEG file; empty for a file of its own
+  std::string name;                   ///< as the mesh has it; for errors where it is embedded
+  std::span<const std::byte> bytes;   ///< of an embedded picture; empty for a file of its own
+  std::shared_ptr<const void> owner;  ///< of these
+  /// A stored value v becomes base + gain * v, 0..1 (-mm of .mtl files).
+  float base = 0, gain = 1;
+  /// Of an opacity map: which channel it is: r, g, b, m (alpha), l (brightness); 0: alpha where there is one,
+  /// else brightness.
+  char channel = 0;
   bool used() const { return !name.empty() || !bytes.empty(); }
 };
 
@@ -19,17 +27,18 @@ struct TextureReference {
 struct MeshParts {
   Mesh mesh;
   struct Maps {
-    TextureReference color, opacity;
+    TextureReference color, opacity, emission;
     bool alpha_from_texture = false;  ///< a mask where the texture has alpha, as in .obj files
   };
   std::vector<Maps> maps;  ///< one a material
 };
 
 /// Checks that indices are in range and positions and texture coordinates finite where triangles use them,
-/// brings colours into 0..1, and drops triangles without area. Errors: ErrorCode::input.
+/// brings colours into 0..1, and drops triangles without area, and points that are nowhere. Errors:
+/// ErrorCode::input.
 Status check_mesh(Mesh& mesh, const std::string& path);
 
-/// Reads the textures of the materials that triangles use; each file once.
+/// Reads the textures of the materials that triangles and points use; each once.
 Status load_textures(MeshParts& parts, const std::string& path, Context& ctx);
 
 }  // namespace voxkit

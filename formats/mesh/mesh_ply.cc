@@ -7,7 +7,9 @@
 #include <span>
 #include <utility>
 
+#include "formats/lab.h"
 #include "formats/mapped_file.h"
+#include "formats/mesh/mesh_builder.h"
 #include "formats/mesh/ply_file.h"
 
 namespace voxkit {
@@ -15,38 +17,42 @@ namespace {
 
 using namespace ply;
 
-float light_of(double stored) {
-  return static_cast<float>(stored <= 0.04045 ? stored / 12.92 : std::pow((stored + 0.055) / 1.055, 2.4));
-}
-
 class PlyReader {
  public:
   PlyReader(const Header& header, std::span<const std::byte> bytes, const std::string& path, Context& ctx)
-      : header_(header), numbers_(bytes, header, path), path_(path), ctx_(ctx) {}
+      : header_(header), numbers_(bytes, header, path), path_(path), builder_(path, ctx) {}
 
   Result<MeshParts> read() {
+    // Faces that come before their vertices wait for these.
+    std::vector<std::pair<const Element*, Numbers>> waiting;
+    bool has_vertices = false;
     for (const Element& element : header_.elements) {
       VOX_CHECK(numbers_.check_count(element));
       if (element.name == "vertex") {
+        if (std::exchange(has_vertices, true)) return bad_vertices();
         VOX_CHECK(read_vertices(element));
-      } else if (element.name == "face" && element.has(Role::corners)) {
-        VOX_CHECK(read_faces(element));
+        for (auto& [before, numbers] : waiting) VOX_CHECK(read_faces(*before, numbers));
+        waiting.clear();
+      } else if (!element.has(Role::corners)) {
+        VOX_CHECK(pass_over(element));
+      } else if (has_vertices) {
+        VOX_CHECK(read_faces(element, numbers_));
       } else {
+        waiting.emplace_back(&element, numbers_);
         VOX_CHECK(pass_over(element));
       }
     }
-    Mesh& mesh = parts_.mesh;
-    mesh.materials.resize(1);
-    parts_.maps.resize(1);
-    parts_.maps[0].color.name = mesh.uvs.empty() ? std::string() : header_.texture;
-    return std::move(parts_);
+    if (!waiting.empty()) return bad_vertices();
+    add_materials();
+    for (std::string& note : header_.notes()) builder_.note(std::move(note));
+    if (too_bright_) builder_.note("colors are above 1: they are taken as 1");
+    if (lost_colors_) builder_.note("dropped: colors of faces, since vertices have some");
+    return std::move(builder_).finish();
   }
 
  private:
-  Status hold(uint64_t bytes) {
-    VOX_TRY(Reservation more, Reservation::take(bytes, "the mesh", ctx_));
-    parts_.mesh.memory.push_back(std::move(more));
-    return {};
+  tl::unexpected<Error> bad_vertices() const {
+    return bad_input(path_, "corrupt PLY file: expected one list of vertices with x, y and z");
   }
   Status pass_over(const Element& element) {
     for (uint64_t i = 0; i < element.count && !element.properties.empty(); ++i)
@@ -54,57 +60,73 @@ class PlyReader {
     return {};
   }
 
+  /// Of red, green, blue or alpha as they are stored.
+  void set_color(glm::vec4& color, const Property& p, double value) {
+    const double stored = value * scale_of(p.type);
+    too_bright_ |= stored > 1;
+    color[static_cast<int>(p.role) - static_cast<int>(Role::red)] =
+        static_cast<float>(p.role == Role::alpha ? stored : srgb_to_linear(stored));
+  }
+
   Status read_vertices(const Element& element) {
-    Mesh& mesh = parts_.mesh;
     const bool colors = element.has(Role::red), uvs = element.has(Role::u) && element.has(Role::v);
-    if (!mesh.positions.empty() || !element.has(Role::x) || !element.has(Role::y) || !element.has(Role::z))
-      return bad_input(path_, "corrupt PLY file: expected one list of vertices with x, y and z");
-    if (element.count > UINT32_MAX)
-      return bad_input(path_, fmt::format("a mesh of {} vertices: expected less than 2^32", element.count));
-    VOX_CHECK(
-        hold(element.count * (sizeof(glm::dvec3) + uvs * sizeof(glm::vec2) + colors * sizeof(glm::vec4))));
-    mesh.positions.resize(element.count);
-    if (colors) mesh.colors.resize(element.count, glm::vec4(0, 0, 0, 1));
-    if (uvs) mesh.uvs.resize(element.count);
-    for (uint64_t i = 0; i < element.count; ++i)
+    if (!element.has(Role::x) || !element.has(Role::y) || !element.has(Role::z)) return bad_vertices();
+    VOX_CHECK(builder_.add_attributes({.uvs = uvs, .colors = colors}));
+    VOX_CHECK(builder_.make_room(element.count, 0, 0));
+    for (uint64_t i = 0; i < element.count; ++i) {
+      MeshVertex vertex;
+      if (colors) vertex.color = {0, 0, 0, 1};
       for (const Property& p : element.properties) {
         if (p.role == Role::none) {
           VOX_CHECK(numbers_.pass(p));
           continue;
         }
         VOX_TRY(const double value, numbers_.next(p.type));
-        const int offset = static_cast<int>(p.role);
         if (p.role <= Role::z)
-          mesh.positions[i][offset - static_cast<int>(Role::x)] = value;
-        else if (p.role == Role::alpha && colors)
-          mesh.colors[i].a = static_cast<float>(value * scale_of(p.type));
-        else if (p.role < Role::alpha && colors)
-          mesh.colors[i][offset - static_cast<int>(Role::red)] = light_of(value * scale_of(p.type));
-        else if (p.role == Role::u && uvs)
-          mesh.uvs[i].x = static_cast<float>(value);
-        else if (p.role == Role::v && uvs)
-          mesh.uvs[i].y = static_cast<float>(1 - value);
+          vertex.position[static_cast<int>(p.role) - static_cast<int>(Role::x)] = value;
+        else if (p.role <= Role::alpha && colors)
+          set_color(vertex.color, p, value);
+        else if (p.role == Role::u)
+          vertex.uv.x = static_cast<float>(value);
+        else if (p.role == Role::v)
+          vertex.uv.y = static_cast<float>(1 - value);
       }
+      VOX_CHECK(builder_.add_vertex(vertex));
+    }
+    vertices_ = element.count;
+    vertex_colors_ = colors;
     return {};
   }
 
-  Status read_faces(const Element& element) {
-    std::vector<uint32_t> corners;
+  Status read_faces(const Element& element, Numbers& numbers) {
+    const bool strips = element.name == "tristrips", colors = element.has(Role::red) && !vertex_colors_;
+    lost_colors_ |= element.has(Role::red) && vertex_colors_ && element.count > 0;
+    if (colors) VOX_CHECK(builder_.add_attributes({.colors = true}));
+    std::vector<int64_t> corners;
     std::vector<glm::vec2> texcoords;
     for (uint64_t i = 0; i < element.count; ++i) {
       corners.clear();
       texcoords.clear();
+      glm::vec4 color(0, 0, 0, 1);
+      uint32_t texture = 0;
       for (const Property& p : element.properties) {
-        if (p.role != Role::corners && p.role != Role::texcoords) {
-          VOX_CHECK(numbers_.pass(p));
+        if (!p.list && p.role != Role::none) {
+          VOX_TRY(const double value, numbers.next(p.type));
+          if (p.role == Role::texture)
+            texture = value >= 0 && value < 65536 ? static_cast<uint32_t>(value) : UINT32_MAX;
+          else
+            set_color(color, p, value);
           continue;
         }
-        VOX_TRY(const uint64_t count, numbers_.list_size(p));
+        if (p.role != Role::corners && p.role != Role::texcoords) {
+          VOX_CHECK(numbers.pass(p));
+          continue;
+        }
+        VOX_TRY(const uint64_t count, numbers.list_size(p));
         for (uint64_t j = 0; j < count; ++j) {
-          VOX_TRY(const double value, numbers_.next(p.type));
+          VOX_TRY(const double value, numbers.next(p.type));
           if (p.role == Role::corners) {
-            // check_mesh says what is wrong with an index that is none.
-            corners.push_back(value >= 0 && value < UINT32_MAX ? static_cast<uint32_t>(value) : UINT32_MAX);
+            corners.push_back(value >= -1 && value < UINT32_MAX ? static_cast<int64_t>(value) : INT64_MAX);
           } else if (j % 2 == 0) {
             texcoords.push_back({static_cast<float>(value), 1});
           } else {
@@ -112,57 +134,78 @@ class PlyReader {
           }
         }
       }
-      VOX_CHECK(add_face(corners, texcoords));
+      if (texture >= std::max<size_t>(header_.textures.size(), 1))
+        return bad_input(path_, fmt::format("corrupt PLY file: a face of texture {}: there are {}", texture,
+                                            header_.textures.size()));
+      if (strips) {
+        VOX_CHECK(add_strips(corners));
+      } else {
+        VOX_CHECK(add_face(corners, texcoords, colors ? &color : nullptr, texture));
+      }
     }
     return {};
   }
 
-  /// A fan. A face with texture coordinates of its own has vertices of its own.
-  Status add_face(std::vector<uint32_t>& corners, const std::vector<glm::vec2>& texcoords) {
-    Mesh& mesh = parts_.mesh;
-    if (corners.size() < 3) return {};
-    const bool own = texcoords.size() == corners.size();
-    VOX_CHECK(make_room(corners.size(), own));
-    if (own) {
-      mesh.uvs.resize(mesh.positions.size());
-      for (size_t j = 0; j < corners.size(); ++j) {
-        if (corners[j] >= mesh.positions.size() || mesh.positions.size() >= UINT32_MAX)
-          return bad_input(path_, fmt::format("corrupt mesh: vertex {}: expected one below {}", corners[j],
-                                              mesh.positions.size()));
-        mesh.positions.push_back(mesh.positions[corners[j]]);
-        if (!mesh.colors.empty()) mesh.colors.push_back(mesh.colors[corners[j]]);
-        mesh.uvs.push_back(texcoords[j]);
-        corners[j] = static_cast<uint32_t>(mesh.positions.size() - 1);
-      }
-    }
-    for (size_t j = 2; j < corners.size(); ++j)
-      mesh.triangles.push_back({{corners[0], corners[j - 1], corners[j]}, 0});
-    return {};
+  Status check_corner(int64_t corner) const {
+    if (corner >= 0 && static_cast<uint64_t>(corner) < vertices_) return {};
+    return bad_input(path_, fmt::format("corrupt mesh: vertex {}: expected one below {}", corner, vertices_));
   }
-  /// Lists double in size: memory is counted before they do.
-  Status make_room(size_t corners, bool own) {
-    Mesh& mesh = parts_.mesh;
-    if (mesh.triangles.size() + corners > mesh.triangles.capacity()) {
-      const size_t room = 2 * mesh.triangles.capacity() + corners + 1024;
-      VOX_CHECK(hold((room - mesh.triangles.capacity()) * sizeof(MeshTriangle)));
-      mesh.triangles.reserve(room);
+
+  Status add_strips(std::span<const int64_t> corners) {
+    numbers32_.clear();
+    for (const int64_t corner : corners) {
+      if (corner != -1) {
+        VOX_CHECK(check_corner(corner));
+        numbers32_.push_back(static_cast<uint32_t>(corner));
+        continue;
+      }
+      VOX_CHECK(builder_.add_strip(numbers32_, 0));
+      numbers32_.clear();
     }
-    if (own && mesh.positions.size() + corners > std::min(mesh.positions.capacity(), mesh.uvs.capacity())) {
-      const size_t room = 2 * mesh.positions.size() + corners + 1024;
-      VOX_CHECK(hold((room - mesh.positions.size()) *
-                     (sizeof(glm::dvec3) + sizeof(glm::vec2) + !mesh.colors.empty() * sizeof(glm::vec4))));
-      mesh.positions.reserve(room);
-      mesh.uvs.reserve(room);
-      if (!mesh.colors.empty()) mesh.colors.reserve(room);
+    return builder_.add_strip(numbers32_, 0);
+  }
+
+  /// A face with texture coordinates or a colour of its own has vertices of its own.
+  Status add_face(std::span<const int64_t> corners, const std::vector<glm::vec2>& texcoords,
+                  const glm::vec4* color, uint32_t texture) {
+    if (corners.size() < 3) return {};
+    const bool uvs = texcoords.size() == corners.size();
+    if (uvs) VOX_CHECK(builder_.add_attributes({.uvs = true}));
+    numbers32_.clear();
+    for (size_t j = 0; j < corners.size(); ++j) {
+      VOX_CHECK(check_corner(corners[j]));
+      auto number = static_cast<uint32_t>(corners[j]);
+      if (uvs || color) {
+        MeshVertex vertex{builder_.position(number), builder_.uv(number), {}, builder_.color(number)};
+        if (uvs) vertex.uv = texcoords[j];
+        if (color) vertex.color = *color;
+        VOX_TRY(number, builder_.add_vertex(vertex));
+      }
+      numbers32_.push_back(number);
     }
-    return {};
+    return builder_.add_polygon(numbers32_, texture);
+  }
+
+  /// One for each texture, in their order.
+  void add_materials() {
+    const bool uvs = builder_.attributes().uvs;
+    for (size_t i = 0; i < std::max<size_t>(header_.textures.size(), 1); ++i) {
+      MeshParts::Maps maps;
+      if (uvs && i < header_.textures.size()) maps.color.name = header_.textures[i];
+      builder_.add_material({}, std::move(maps));
+    }
+    if (!uvs && !header_.textures.empty())
+      builder_.note(
+          fmt::format("the texture {} is left out: there are no texture coordinates", header_.textures[0]));
   }
 
   const Header& header_;
   Numbers numbers_;
   const std::string& path_;
-  Context& ctx_;
-  MeshParts parts_;
+  MeshBuilder builder_;
+  uint64_t vertices_ = 0;  ///< of the file
+  bool vertex_colors_ = false, too_bright_ = false, lost_colors_ = false;
+  std::vector<uint32_t> numbers32_;
 };
 
 }  // namespace

@@ -32,6 +32,10 @@ Role role_of(std::string_view element, std::string_view property, bool list) {
                                                                {"green", green},
                                                                {"blue", blue},
                                                                {"alpha", alpha},
+                                                               {"r", red},
+                                                               {"g", green},
+                                                               {"b", blue},
+                                                               {"a", alpha},
                                                                {"s", u},
                                                                {"t", v},
                                                                {"u", u},
@@ -40,15 +44,22 @@ Role role_of(std::string_view element, std::string_view property, bool list) {
                                                                {"texture_v", v},
                                                                {"diffuse_red", red},
                                                                {"diffuse_green", green},
-                                                               {"diffuse_blue", blue}};
+                                                               {"diffuse_blue", blue},
+                                                               {"diffuse_alpha", alpha}};
   constexpr std::pair<std::string_view, Role> of_faces[] = {
       {"vertex_indices", corners}, {"vertex_index", corners}, {"texcoord", texcoords}};
+  const bool strips = element == "tristrips";
   if (element == "vertex" && !list)
     for (const auto& [name, role] : of_vertices)
       if (property == name) return role;
-  if (element == "face" && list)
+  if ((element == "face" || strips) && list)
     for (const auto& [name, role] : of_faces)
-      if (property == name) return role;
+      if (property == name && (role == corners || !strips)) return role;
+  if (element == "face" && !list) {
+    if (property == "texnumber") return texture;
+    for (const auto& [name, role] : of_vertices)
+      if (property == name && role >= red && role <= alpha) return role;
+  }
   return none;
 }
 
@@ -99,7 +110,7 @@ double load(const std::byte* bytes, Type type, bool big_endian) {
 }
 
 double scale_of(Type type) {
-  return type == Type::u8 ? 1.0 / 255 : type == Type::u16 ? 1.0 / 65535 : 1;
+  return type == Type::f32 || type == Type::f64 ? 1 : type == Type::u16 ? 1.0 / 65535 : 1.0 / 255;
 }
 
 Result<Header> read_header(std::span<const std::byte> bytes, const std::string& path) {
@@ -120,7 +131,7 @@ Result<Header> read_header(std::span<const std::byte> bytes, const std::string& 
     if (words.empty() || words[0] == "ply" || words[0] == "obj_info") continue;
     if (words[0] == "comment") {
       if (words.size() > 2 && words[1] == "TextureFile")
-        header.texture = std::string(words[2].data(), words.back().data() + words.back().size());
+        header.textures.emplace_back(words[2].data(), words.back().data() + words.back().size());
     } else if (words[0] == "end_header") {
       header.end = at;
       if (!has_format) return broken("no format is named");
@@ -150,10 +161,20 @@ Result<Header> read_header(std::span<const std::byte> bytes, const std::string& 
       property.count_type = *count_type;
       property.role = role_of(header.elements.back().name, words.back(), property.list);
       header.elements.back().properties.push_back(property);
+      if (property.role == Role::none)
+        header.dropped.push_back(fmt::format("{} of {}", words.back(), header.elements.back().name));
     } else {
       return broken("expected format, comment, element, property or end_header");
     }
   }
+}
+
+std::vector<std::string> Header::notes() const {
+  constexpr size_t most = 16;
+  if (dropped.empty()) return {};
+  const std::span<const std::string> first(dropped.data(), std::min(dropped.size(), most));
+  return {fmt::format("dropped: {}{}", fmt::join(first, ", "),
+                      dropped.size() > most ? fmt::format(" and {} others", dropped.size() - most) : "")};
 }
 
 Result<double> Numbers::next_word() {

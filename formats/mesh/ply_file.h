@@ -17,11 +17,11 @@ enum class Type : uint8_t { i8, u8, i16, u16, i32, u32, f32, f64 };
 size_t bytes_of(Type type);
 /// A number as it lies in a binary file.
 double load(const std::byte* bytes, Type type, bool big_endian);
-/// Of colours: what makes them 0 to 1.
+/// Of colours: what makes them 0 to 1. Whole numbers of more than 16 bits have those of 8.
 double scale_of(Type type);
 
 /// What of a mesh a property is.
-enum class Role : uint8_t { none, x, y, z, red, green, blue, alpha, u, v, corners, texcoords };
+enum class Role : uint8_t { none, x, y, z, red, green, blue, alpha, u, v, corners, texcoords, texture };
 
 struct Property {
   Type type = Type::f32, count_type = Type::u8;
@@ -41,8 +41,11 @@ struct Element {
 struct Header {
   bool ascii = false, big_endian = false;
   std::vector<Element> elements;
-  std::string texture;
-  size_t end = 0;  ///< where the data begins
+  std::vector<std::string> textures;
+  std::vector<std::string> dropped;  ///< elements and properties that are no part of a mesh
+  size_t end = 0;                    ///< where the data begins
+  /// What is dropped, in a sentence; nothing where nothing is.
+  std::vector<std::string> notes() const;
 };
 
 /// The header at the beginning of a file. `path` is for messages.

@@ -28,13 +28,18 @@ class PointFields {
     if (property.role >= Role::x && property.role <= Role::z) {
       point.at[static_cast<int>(property.role) - static_cast<int>(Role::x)] = value;
     } else if (property.role >= Role::red && property.role <= Role::blue && colors_) {
-      const double stored = value * scale_of(property.type);  // written so that a NaN becomes 0
-      point.color[static_cast<size_t>(property.role) - static_cast<size_t>(Role::red)] =
-          static_cast<uint8_t>(stored > 0 ? std::lround(255 * std::min(stored, 1.0)) : 0);
+      const double stored = value * scale_of(property.type);
+      point.color[static_cast<size_t>(property.role) - static_cast<size_t>(Role::red)] = byte_of(stored);
+    } else if (property.role == Role::alpha) {
+      point.alpha = byte_of(value * scale_of(property.type));
     }
   }
 
  private:
+  /// Written so that a NaN becomes 0.
+  static uint8_t byte_of(double share) {
+    return static_cast<uint8_t>(share > 0 ? std::lround(255 * std::min(share, 1.0)) : 0);
+  }
   bool colors_;
 };
 
@@ -43,6 +48,7 @@ class PlyPointCloud final : public PointCloud {
   PlyPointCloud(std::shared_ptr<const MappedFile> file, Header header, size_t vertices)
       : file_(std::move(file)), header_(std::move(header)), vertices_(vertices) {
     size_ = header_.elements[vertices_].count;
+    notes_ = header_.notes();
   }
 
   Status read(const Sink& sink) const override {
@@ -98,10 +104,10 @@ class PlyPointCloud final : public PointCloud {
     for (uint64_t i = 0; i < size_; ++i) {
       CloudPoint& point = run.emplace_back(blank);
       VOX_TRY(end, next(i, point));
+      bool there = point.alpha >= 128;
       for (int a = 0; a < 3; ++a)
-        if (constexpr double large = 3.5e38; !(std::abs(point.at[a]) <= large))
-          return bad_input(file_->name(), fmt::format("a point at {}, {}, {}: expected finite coordinates",
-                                                      point.at.x, point.at.y, point.at.z));
+        if (constexpr double large = 3.5e38; !(std::abs(point.at[a]) <= large)) there = false;
+      if (!there) run.pop_back();
       if (run.size() < most && i + 1 < size_) continue;
       VOX_CHECK(check_interrupt());
       VOX_CHECK(sink(run));
@@ -125,7 +131,7 @@ Result<std::unique_ptr<const PointCloud>> open_ply_points(const std::string& pat
   size_t vertices = header.elements.size();
   for (size_t i = header.elements.size(); i-- > 0;) {
     const Element& element = header.elements[i];
-    if (element.name == "face" && element.has(Role::corners) && element.count > 0) return nullptr;
+    if (element.has(Role::corners) && element.count > 0) return nullptr;
     if (element.name == "vertex") vertices = i;
   }
   if (vertices == header.elements.size() || !header.elements[vertices].has(Role::x) ||

@@ -2,30 +2,47 @@
 
 #include <fmt/format.h>
 
+#include <algorithm>
+#include <cmath>
 #include <cstring>
+#include <limits>
 #include <vector>
 
 namespace voxkit {
 
-Result<PlyPointWriter> PlyPointWriter::create(const std::string& path, uint64_t count, bool force) {
+bool needs_doubles(double from, double to, double step) {
+  const double furthest = std::max(std::abs(from), std::abs(to));
+  if (!(furthest <= std::numeric_limits<float>::max())) return true;
+  // Floats have 24 bits; rounding moves a number by half of the last one at most.
+  return std::ldexp(1, std::ilogb(std::max(furthest, 1e-300)) - 24) > std::abs(step) / 256;
+}
+
+Result<PlyPointWriter> PlyPointWriter::create(const std::string& path, uint64_t count, bool doubles,
+                                              bool force) {
   VOX_TRY(auto out, OutputFile::create(path, force));
   const std::string header = fmt::format(
-      "ply\nformat binary_little_endian 1.0\nelement vertex {}\nproperty float x\nproperty float y\nproperty "
-      "float z\n"
+      "ply\nformat binary_little_endian 1.0\nelement vertex {0}\nproperty {1} x\nproperty {1} y\nproperty "
+      "{1} z\n"
       "property uchar red\nproperty uchar green\nproperty uchar blue\nend_header\n",
-      count);
+      count, doubles ? "double" : "float");
   VOX_CHECK(out->write(std::as_bytes(std::span(header))));
-  return PlyPointWriter(std::move(out));
+  return PlyPointWriter(std::move(out), doubles);
 }
 
 Status PlyPointWriter::add(std::span<const ColoredPoint> points) {
-  constexpr size_t point_bytes = 15;
-  std::vector<std::byte> bytes(points.size() * point_bytes);
+  const size_t place_bytes = doubles_ ? 24 : 12;
+  std::vector<std::byte> bytes(points.size() * (place_bytes + 3));
   std::byte* to = bytes.data();
   for (const ColoredPoint& point : points) {
-    std::memcpy(to, point.at.data(), 12);
-    std::memcpy(to + 12, point.color.data(), 3);
-    to += point_bytes;
+    if (doubles_) {
+      std::memcpy(to, point.at.data(), place_bytes);
+    } else {
+      const float at[3] = {static_cast<float>(point.at[0]), static_cast<float>(point.at[1]),
+                           static_cast<float>(point.at[2])};
+      std::memcpy(to, at, place_bytes);
+    }
+    std::memcpy(to + place_bytes, point.color.data(), 3);
+    to += place_bytes + 3;
   }
   return out_->write(bytes);
 }

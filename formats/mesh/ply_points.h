@@ -14,22 +14,28 @@ namespace voxkit {
 
 /// A point, and its colour as R, G, B in sRGB.
 struct ColoredPoint {
-  std::array<float, 3> at;
+  std::array<double, 3> at;
   std::array<uint8_t, 3> color;
 };
 
-/// Writes a binary little-endian PLY file of points: x, y, z as floats, red, green and blue as bytes.
+/// Whether places on a line between `from` and `to`, `step` apart, need to be doubles: where rounding to
+/// floats would move one by more than 1/256 of a step.
+bool needs_doubles(double from, double to, double step);
+
+/// Writes a binary little-endian PLY file of points: x, y, z as floats or doubles, red, green and blue as
+/// bytes.
 class PlyPointWriter {
  public:
   /// `count` points will come. Errors: those of OutputFile.
-  static Result<PlyPointWriter> create(const std::string& path, uint64_t count, bool force);
+  static Result<PlyPointWriter> create(const std::string& path, uint64_t count, bool doubles, bool force);
   Status add(std::span<const ColoredPoint> points);
   /// Completes the file; without it, it never appears.
   Status finish();
 
  private:
-  explicit PlyPointWriter(std::unique_ptr<OutputFile> out) : out_(std::move(out)) {}
+  PlyPointWriter(std::unique_ptr<OutputFile> out, bool doubles) : out_(std::move(out)), doubles_(doubles) {}
   std::unique_ptr<OutputFile> out_;
+  bool doubles_;
 };
 
 }  // namespace voxkit

@@ -8,6 +8,7 @@
 #include <memory>
 #include <span>
 #include <string>
+#include <vector>
 
 #include "formats/result.h"
 
@@ -17,20 +18,25 @@ namespace voxkit {
 struct CloudPoint {
   glm::dvec3 at{0};
   std::array<uint8_t, 3> color{};
+  uint8_t alpha = 255;
 };
 
 class PointCloud {
  public:
   virtual ~PointCloud() = default;
+  /// As many as there are in the file.
   uint64_t size() const { return size_; }
+  /// What of the file is left out, a sentence each.
+  const std::vector<std::string>& notes() const { return notes_; }
 
   using Sink = std::function<Status(std::span<const CloudPoint>)>;
-  /// Calls `sink` with all points, in runs, in their order. ErrorCode::input where the file is damaged or a
-  /// coordinate is not finite; `sink`'s errors.
+  /// Calls `sink` with the points, in runs, in their order: all but those with a coordinate that is not
+  /// finite or an alpha below a half. ErrorCode::input where the file is damaged; `sink`'s errors.
   virtual Status read(const Sink& sink) const = 0;
 
  protected:
   uint64_t size_ = 0;
+  std::vector<std::string> notes_;
 };
 
 /// The points of a .ply file: its vertices, which have x, y and z, and red, green and blue or no colours:

@@ -21,22 +21,30 @@ struct Texture {
   uint8_t* data() { return reinterpret_cast<uint8_t*>(texels->data()); }
 };
 
-/// Most texels a side.
+/// Most texels a side, and in all: larger pictures are refused before they are decoded.
 inline constexpr int64_t max_texture_side = 1 << 16;
+inline constexpr int64_t max_texture_texels = int64_t{1} << 28;
 
 /// An opaque or transparent picture in one colour; `fill` is R, G, B, A in its lowest to highest byte.
 Result<Texture> plain_texture(int64_t width, int64_t height, uint32_t fill, Context& ctx);
 
-/// Reads a file of any format that `read_image` knows, and .tga and .bmp. Samples of 16 bits are rounded to
-/// 8, floats are taken as linear light. Errors: ErrorCode::input, ErrorCode::limit.
+/// ErrorCode::input for pictures above these, or without texels.
+Status check_texture_size(const std::string& name, uint64_t width, uint64_t height);
+
+/// Reads a file of any format that `read_image` knows, and .tga, .bmp and .webp. Samples of 16 bits are
+/// rounded to 8, floats are taken as linear light. Errors: ErrorCode::input, ErrorCode::limit.
 Result<Texture> read_texture(const std::string& path, Context& ctx);
 
-/// The same of the bytes of a PNG or JPEG file. `name` is for errors.
+/// The same of the bytes of a PNG, JPEG or WebP file. `name` is for errors.
 Result<Texture> decode_texture(const std::string& name, std::span<const std::byte> bytes, Context& ctx);
 
-/// Puts the opacity that `mask` shows, its alpha where it has one and else its brightness, in place of the
-/// alpha of `texture`. A mask of another size is stretched over it: the nearest texel counts.
-void set_opacity(Texture& texture, const Texture& mask);
+/// Stored colours v become base + gain * v, 0..1.
+void adjust_colors(Texture& texture, float base, float gain);
+
+/// Puts the opacity that `mask` shows in place of the alpha of `texture`: its channel r, g, b, m (alpha) or l
+/// (brightness); 0: its alpha where it has one and else its brightness. A mask of another size is stretched
+/// over it: the nearest texel counts.
+void set_opacity(Texture& texture, const Texture& mask, char channel = 0);
 
 /// Finds the file that a mesh in `folder` calls `name`: as it is written, with '/' for '\', and with its
 /// %-escapes resolved; then in letters of either case; then by its last part, beside the mesh. Empty where

@@ -114,9 +114,11 @@ class PartFile {
 
 class PointSurface final : public SurfaceSource {
  public:
-  PointSurface(std::unique_ptr<const PointCloud> points, VolumeInfo info, const glm::dvec3& lo)
+  PointSurface(std::unique_ptr<const PointCloud> points, VolumeInfo info, const glm::dvec3& lo,
+               std::vector<std::string> notes)
       : points_(std::move(points)), lo_(lo), edge_(info.affine.axes[0][0]) {
     info_ = std::move(info);
+    notes_ = std::move(notes);
     info_.format = VoxelFormat::rgba32;
   }
 
@@ -175,7 +177,9 @@ Result<std::unique_ptr<SurfaceSource>> surface_of_points(std::unique_ptr<const P
     return bad_usage(
         fmt::format("a resolution of {}: expected 1 to {}", resolution, int64_t{1} << most_levels));
   glm::dvec3 lo(INFINITY), hi(-INFINITY);
+  uint64_t seen = 0;
   VOX_CHECK(points->read([&](std::span<const CloudPoint> run) -> Status {
+    seen += run.size();
     for (const CloudPoint& point : run)
       for (int a = 0; a < 3; ++a) {
         lo[a] = std::min(lo[a], point.at[a]);
@@ -183,6 +187,13 @@ Result<std::unique_ptr<SurfaceSource>> surface_of_points(std::unique_ptr<const P
       }
     return {};
   }));
+  if (seen == 0) return bad_input({}, "no points that are at finite coordinates and at least half opaque");
+  std::vector<std::string> notes = points->notes();
+  if (seen < points->size())
+    notes.push_back(
+        fmt::format("{} of {} points are dropped: they are at coordinates that are not finite, or less "
+                    "than half opaque",
+                    points->size() - seen, points->size()));
   const double longest = std::max({hi.x - lo.x, hi.y - lo.y, hi.z - lo.z});
   const double edge = longest > 0 ? longest / static_cast<double>(resolution) : 1;
   VolumeInfo info;
@@ -193,7 +204,7 @@ Result<std::unique_ptr<SurfaceSource>> surface_of_points(std::unique_ptr<const P
     info.affine.axes[axis][axis] = edge;
     info.affine.origin[axis] = lo[a] + edge / 2;
   }
-  return std::make_unique<PointSurface>(std::move(points), std::move(info), lo);
+  return std::make_unique<PointSurface>(std::move(points), std::move(info), lo, std::move(notes));
 }
 
 }  // namespace voxkit::color

@@ -11,7 +11,8 @@ namespace voxkit::color {
 /// Points of no size in a grid with `resolution` voxels, 1 to 2^21, along their longest side: a voxel has the
 /// mean of its points' colours in linear light, rounded once. The points are read once now and once for the
 /// voxels. What does not fit into a quarter of the memory limit is sorted in parts, 16 bytes a point, which
-/// go through a file in $TMPDIR (default /tmp). ErrorCode::usage for the resolution; those of the points.
+/// go through a file in $TMPDIR (default /tmp). ErrorCode::usage for the resolution, ErrorCode::input where
+/// no point counts; those of the points.
 Result<std::unique_ptr<SurfaceSource>> surface_of_points(std::unique_ptr<const PointCloud> points,
                                                          int64_t resolution, Context& ctx);
 

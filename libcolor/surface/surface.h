@@ -4,6 +4,8 @@
 #include <cstdint>
 #include <functional>
 #include <span>
+#include <string>
+#include <vector>
 
 #include "formats/context.h"
 #include "formats/volume.h"
@@ -31,6 +33,10 @@ class SurfaceSource {
 
   /// Extents and place in space; the format is rgba32, no side is above 2^21.
   const VolumeInfo& info() const { return info_; }
+  /// What the input says and a surface cannot, a sentence each.
+  const std::vector<std::string>& notes() const { return notes_; }
+  /// Whether the input's emission is in the colours.
+  bool emits() const { return emits_; }
 
   using Sink = std::function<Status(std::span<const SurfaceVoxel>)>;
   /// Calls `sink`, from one thread at a time, with runs of voxels. Places ascend strictly, within a run and
@@ -39,6 +45,8 @@ class SurfaceSource {
 
  protected:
   VolumeInfo info_;
+  std::vector<std::string> notes_;
+  bool emits_ = false;
 };
 
 }  // namespace voxkit::color

@@ -146,10 +146,18 @@ Float4 TextureLevels::bilinear(const Level& level, float u, float v, TextureWrap
   return upper + (lower - upper) * y.weight;
 }
 
-Float4 TextureLevels::sample(double u, double v, TextureWrap wrap_u, TextureWrap wrap_v,
+Float4 TextureLevels::nearest(const Level& level, float u, float v) {
+  const auto texel = [](float t, int32_t size) {
+    return std::min(static_cast<int32_t>(t * static_cast<float>(size)), size - 1);
+  };
+  return load(level.at(texel(u, level.width), texel(v, level.height)));
+}
+
+Float4 TextureLevels::sample(double u, double v, TextureWrap wrap_u, TextureWrap wrap_v, TextureFilter filter,
                              Detail detail) const {
   const float s = wrapped(u, wrap_u), t = wrapped(v, wrap_v);
-  Float4 value = bilinear(levels_[detail.level], s, t, wrap_u, wrap_v);
+  const bool as_it_is = filter == TextureFilter::nearest && detail.level == 0;
+  Float4 value = as_it_is ? nearest(levels_[0], s, t) : bilinear(levels_[detail.level], s, t, wrap_u, wrap_v);
   if (detail.next > 0)
     value += (bilinear(levels_[detail.level + 1], s, t, wrap_u, wrap_v) - value) * detail.next;
   return value;

@@ -32,8 +32,9 @@ class TextureLevels {
   Detail detail(double texels_squared) const;
 
   /// The mean around (u, v), linear between texels and levels: colours times alpha, and alpha, in 0..65535.
-  /// Any finite u and v.
-  Float4 sample(double u, double v, TextureWrap wrap_u, TextureWrap wrap_v, Detail detail) const;
+  /// With TextureFilter::nearest the texels of the first level are as they are. Any finite u and v.
+  Float4 sample(double u, double v, TextureWrap wrap_u, TextureWrap wrap_v, TextureFilter filter,
+                Detail detail) const;
 
  private:
   /// Texels of 4 numbers of 16 bits, row by row. (Tiles of 8 x 8 were no faster.)
@@ -47,6 +48,7 @@ class TextureLevels {
   };
   static Result<Level> halved(const Level& from, Context& ctx);
   static Float4 bilinear(const Level& level, float u, float v, TextureWrap wrap_u, TextureWrap wrap_v);
+  static Float4 nearest(const Level& level, float u, float v);
   std::vector<Level> levels_;
 };
 

@@ -12,9 +12,11 @@ namespace {
 class VoxelList final : public SurfaceSource {
  public:
   /// `voxels` ascend strictly.
-  VoxelList(VolumeInfo info, std::vector<SurfaceVoxel> voxels, Reservation memory)
+  VoxelList(VolumeInfo info, std::vector<SurfaceVoxel> voxels, Reservation memory,
+            std::vector<std::string> notes)
       : voxels_(std::move(voxels)), memory_(std::move(memory)) {
     info_ = std::move(info);
+    notes_ = std::move(notes);
     info_.format = VoxelFormat::rgba32;
   }
   Status read(Context&, const Sink& sink) override { return voxels_.empty() ? Status() : sink(voxels_); }
@@ -62,7 +64,8 @@ Result<std::unique_ptr<SurfaceSource>> surface_of(VoxelScene scene, Context& ctx
   for (size_t i = 0; i < voxels.size(); ++i)
     if (i + 1 == voxels.size() || voxels[i + 1].place != voxels[i].place) voxels[kept++] = voxels[i];
   voxels.resize(kept);
-  return std::make_unique<VoxelList>(std::move(info), std::move(voxels), std::move(memory));
+  return std::make_unique<VoxelList>(std::move(info), std::move(voxels), std::move(memory),
+                                     std::move(scene.notes));
 }
 
 }  // namespace voxkit::color

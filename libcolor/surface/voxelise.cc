@@ -69,11 +69,19 @@ class Parts {
   uint64_t counted_ = 0;
 };
 
+/// What is to be said of a mesh.
+struct Remarks {
+  std::vector<std::string> notes;
+  bool emits = false;
+};
+
 class MeshSurface : public SurfaceSource {
  public:
-  MeshSurface(VoxelScene scene, const VolumeInfo& info, int tile_bits, Reservation memory)
+  MeshSurface(VoxelScene scene, const VolumeInfo& info, int tile_bits, Reservation memory, Remarks remarks)
       : scene_(std::move(scene)), memory_(std::move(memory)) {
     info_ = info;
+    notes_ = std::move(remarks.notes);
+    emits_ = remarks.emits;
     const int64_t side = std::max({info.dims.x, info.dims.y, info.dims.z});
     while (int64_t{1} << all_.bits < side) ++all_.bits;
     tile_bits_ = std::min(tile_bits, all_.bits);
@@ -120,15 +128,19 @@ Grid fit(const Mesh& mesh, int64_t resolution) {
   Grid grid;
   glm::dvec3 hi(-INFINITY);
   grid.lo = glm::dvec3(INFINITY);
+  const auto enclose = [&](uint32_t vertex) {
+    for (int c = 0; c < 3; ++c) {
+      grid.lo[c] = std::min(grid.lo[c], mesh.positions[vertex][c]);
+      hi[c] = std::max(hi[c], mesh.positions[vertex][c]);
+    }
+  };
   for (const MeshTriangle& triangle : mesh.triangles)
-    for (const uint32_t v : triangle.vertices)
-      for (int c = 0; c < 3; ++c) {
-        grid.lo[c] = std::min(grid.lo[c], mesh.positions[v][c]);
-        hi[c] = std::max(hi[c], mesh.positions[v][c]);
-      }
+    for (const uint32_t v : triangle.vertices) enclose(v);
+  for (const MeshPoint& point : mesh.points) enclose(point.vertex);
   const glm::dvec3 size = hi - grid.lo;
-  const double longest = std::max({size.x, size.y, size.z}), edge = longest / static_cast<double>(resolution);
-  grid.scale = static_cast<double>(resolution * 256) / longest;
+  const double longest = std::max({size.x, size.y, size.z});
+  const double edge = longest > 0 ? longest / static_cast<double>(resolution) : 1;  // else a single point
+  grid.scale = longest > 0 ? static_cast<double>(resolution * 256) / longest : 256;
   grid.info.format = VoxelFormat::rgba32;
   for (int c = 0; c < 3; ++c) {
     const auto steps = static_cast<int64_t>(std::llround(size[c] * grid.scale));
@@ -151,45 +163,84 @@ SnappedTriangle snap(const Mesh& mesh, const MeshTriangle& triangle, const Grid&
   return out;
 }
 
+/// What is not kept of opacity and emission.
+Remarks remarks_of(const Mesh& mesh, bool emission) {
+  Remarks out;
+  out.notes = mesh.notes;
+  std::vector<bool> used(mesh.materials.size());
+  for (const MeshTriangle& triangle : mesh.triangles) used[triangle.material] = true;
+  for (const MeshPoint& point : mesh.points) used[point.material] = true;
+  const bool faint_corners =
+      std::any_of(mesh.colors.begin(), mesh.colors.end(), [](const glm::vec4& color) { return color.a < 1; });
+  int blended = 0, emitting = 0;
+  for (size_t i = 0; i < used.size(); ++i) {
+    const MeshMaterial& m = mesh.materials[i];
+    if (!used[i]) continue;
+    emitting += m.emits();
+    if (m.alpha_mode == AlphaMode::blend)
+      blended += m.color.a < 1 || faint_corners ||
+                 (m.texture >= 0 && mesh.textures[static_cast<size_t>(m.texture)].has_alpha);
+  }
+  if (blended)
+    out.notes.push_back(fmt::format(
+        "opacity becomes yes or no: of {} blended materials there is what is at least half opaque", blended));
+  if (emitting && !emission) out.notes.push_back(fmt::format("dropped: emission of {} materials", emitting));
+  out.emits = emitting && emission;
+  return out;
+}
+
 }  // namespace
 
 Result<std::unique_ptr<SurfaceSource>> make_surface(Mesh mesh, const VoxeliseOptions& options, Context& ctx) {
   if (options.resolution < 1 || options.resolution > int64_t{1} << most_levels)
     return bad_usage(
         fmt::format("a resolution of {}: expected 1 to {}", options.resolution, int64_t{1} << most_levels));
-  if (mesh.triangles.empty() || mesh.triangles.size() > UINT32_MAX)
-    return bad_input({}, "a mesh without triangles, or of 2^32 or more");
+  const uint64_t parts = uint64_t{mesh.triangles.size()} + mesh.points.size();
+  if (parts == 0 || parts > UINT32_MAX) return bad_input({}, "a mesh without triangles, or of 2^32 or more");
+  Remarks remarks = remarks_of(mesh, options.emission);
   const Grid grid = fit(mesh, options.resolution);
-  // Corners, and the numbers of triangles in the lists of the largest cubes.
+  // Corners, and the numbers of triangles in the lists of the largest cubes; points as triangles.
+  const uint64_t as_triangles = mesh.points.empty() ? 0 : parts * sizeof(MeshTriangle);
   VOX_TRY(Reservation memory,
-          Reservation::take(mesh.triangles.size() * (sizeof(SnappedTriangle) + 3 * sizeof(uint32_t)),
+          Reservation::take(parts * (sizeof(SnappedTriangle) + 3 * sizeof(uint32_t)) + as_triangles,
                             "voxelising", ctx));
   VoxelScene scene;
   scene.kind = options.kind;
-  scene.corners.reserve(mesh.triangles.size());
+  scene.first_point = mesh.triangles.size();
+  mesh.triangles.reserve(parts);
+  for (const auto& [vertex, material] : mesh.points)
+    mesh.triangles.push_back({{vertex, vertex, vertex}, material});
+  scene.corners.reserve(parts);
   for (const MeshTriangle& triangle : mesh.triangles) scene.corners.push_back(snap(mesh, triangle, grid));
 
   // One set of levels for a texture that is opaque and one where it is not.
   std::vector<std::array<int32_t, 2>> known(mesh.textures.size(), {-1, -1});
-  for (MeshMaterial& material : mesh.materials) {
-    if (material.alpha_mode == AlphaMode::mask && !(material.alpha_cutoff > 0))
-      material.alpha_mode = AlphaMode::opaque;
-    scene.texture_of.push_back(-1);
-    if (material.texture < 0) continue;
-    const Texture& texture = mesh.textures[static_cast<size_t>(material.texture)];
-    const bool opaque = material.alpha_mode == AlphaMode::opaque || !texture.has_alpha;
-    int32_t& index = known[static_cast<size_t>(material.texture)][opaque];
+  const auto levels_of = [&](int32_t number, bool opaque) -> Result<int32_t> {
+    if (number < 0) return -1;
+    const Texture& texture = mesh.textures[static_cast<size_t>(number)];
+    opaque |= !texture.has_alpha;
+    int32_t& index = known[static_cast<size_t>(number)][opaque];
     if (index < 0) {
       VOX_TRY(TextureLevels levels, TextureLevels::make(texture, opaque, ctx));
       index = static_cast<int32_t>(scene.textures.size());
       scene.textures.push_back(std::move(levels));
     }
-    scene.texture_of.back() = index;
+    return index;
+  };
+  for (MeshMaterial& material : mesh.materials) {
+    if (material.alpha_mode == AlphaMode::mask && !(material.alpha_cutoff > 0))
+      material.alpha_mode = AlphaMode::opaque;
+    if (!options.emission) material.emission = glm::vec3(0), material.emission_texture = -1;
+    VOX_TRY(const int32_t color, levels_of(material.texture, material.alpha_mode == AlphaMode::opaque));
+    VOX_TRY(const int32_t emission, levels_of(material.emission_texture, true));
+    scene.texture_of.push_back(color);
+    scene.emission_texture_of.push_back(emission);
   }
   mesh.textures.clear();
   mesh.positions = {};
   scene.mesh = std::move(mesh);
-  return std::make_unique<MeshSurface>(std::move(scene), grid.info, options.tile_bits, std::move(memory));
+  return std::make_unique<MeshSurface>(std::move(scene), grid.info, options.tile_bits, std::move(memory),
+                                       std::move(remarks));
 }
 
 }  // namespace voxkit::color

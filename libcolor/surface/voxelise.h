@@ -17,17 +17,21 @@ struct VoxeliseOptions {
   /// Voxels along the side of the cubes that the work is split into, as a power of two, 0 to 8. The result
   /// does not depend on it.
   int tile_bits = 6;
+  bool emission = true;  ///< is added to the colours
 };
 
 /// The surface of a mesh. Its corners are snapped to a grid of 2^-8 voxel (triangle_cells.h); from there on
 /// it is decided in integers which voxels there are. A thin surface has no hole for what moves from face to
 /// face; a conservative one has every voxel that a triangle touches.
 ///
+/// A point is in the voxel that it lies in.
+///
 /// The colour of a voxel is the mean, in linear light, over the triangles in it, each with the area that it
 /// has there (and times its alpha, where that is blended): of the texture around the point of the triangle
 /// that is nearest to the voxel's centre, at the size at which a voxel's edge is a texel, times the
-/// material's and the corners' colours. A triangle whose alpha there is below its material's cut-off, or is 0
-/// where it is blended, is not in the voxel.
+/// material's and the corners' colours, and its emission added, up to white. A triangle whose alpha there is
+/// below its material's cut-off is not in the voxel. Where all that is in it is blended and less than half
+/// opaque there is no voxel: surfaces are there or not, and a note says where a mesh is something in between.
 ///
 /// Memory: 48 bytes a triangle and 11 a texel beside the mesh, and what the threads work with, which is less
 /// where ctx.memory has little. Errors: ErrorCode::usage for the resolution, ErrorCode::limit.

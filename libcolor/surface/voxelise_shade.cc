@@ -82,27 +82,36 @@ TriangleShade::TriangleShade(const VoxelScene& scene, uint32_t index, const std:
       tint_[i] = float4(color);
       tinted_ |= color != glm::vec4(1);
     }
-  if (const int32_t texture = scene.texture_of[triangle.material]; texture >= 0 && !scene.mesh.uvs.empty()) {
-    texture_ = &scene.textures[static_cast<size_t>(texture)];
-    for (size_t i = 0; i < 3; ++i) {
-      const glm::vec2& uv = scene.mesh.uvs[triangle.vertices[i]];
-      u_[i] = uv.x - (i ? u_[0] : 0);
-      v_[i] = uv.y - (i ? v_[0] : 0);
-    }
-    // The longest side of what a voxel's edge covers in the texture: the larger singular value of the map.
-    Place s, t;
-    for (size_t c = 0; c < 3; ++c) {
-      s[c] = static_cast<double>(texture_->width()) * (u_[1] * gradient_[0][c] + u_[2] * gradient_[1][c]);
-      t[c] = static_cast<double>(texture_->height()) * (v_[1] * gradient_[0][c] + v_[2] * gradient_[1][c]);
-    }
-    const double ss = dot(s, s), tt = dot(t, t), st = dot(s, t), half = (ss - tt) / 2;
-    detail_ = texture_->detail((ss + tt) / 2 + std::sqrt(half * half + st * st));
-  } else if (!tinted_) {
-    plain_ = shade(all_light, Float4{1, 1, 1, 1});
-  }
+  const Mesh& mesh = scene.mesh;
+  if (const int32_t texture = scene.texture_of[triangle.material]; texture >= 0 && !mesh.uvs.empty())
+    lay(color_, scene.textures[static_cast<size_t>(texture)], mesh.uvs, triangle);
+  if (const int32_t texture = scene.emission_texture_of[triangle.material]; texture >= 0 && !mesh.uvs.empty())
+    lay(emission_, scene.textures[static_cast<size_t>(texture)],
+        mesh.emission_uvs.empty() ? mesh.uvs : mesh.emission_uvs, triangle);
+  if (!color_.texture && !emission_.texture && !tinted_)
+    plain_ = shade(all_light, Float4{1, 1, 1, 1}, all_light);
 }
 
-Shade TriangleShade::shade(Float4 texel, Float4 tint) const {
+void TriangleShade::lay(Map& map, const TextureLevels& texture, const std::vector<glm::vec2>& uvs,
+                        const MeshTriangle& triangle) const {
+  map.texture = &texture;
+  for (size_t i = 0; i < 3; ++i) {
+    const glm::vec2& uv = uvs[triangle.vertices[i]];
+    map.u[i] = uv.x - (i ? map.u[0] : 0);
+    map.v[i] = uv.y - (i ? map.v[0] : 0);
+  }
+  // The longest side of what a voxel's edge covers in the texture: the larger singular value of the map.
+  Place s, t;
+  for (size_t c = 0; c < 3; ++c) {
+    s[c] = static_cast<double>(texture.width()) * (map.u[1] * gradient_[0][c] + map.u[2] * gradient_[1][c]);
+    t[c] = static_cast<double>(texture.height()) * (map.v[1] * gradient_[0][c] + map.v[2] * gradient_[1][c]);
+  }
+  const double ss = dot(s, s), tt = dot(t, t), st = dot(s, t), half = (ss - tt) / 2;
+  map.detail = texture.detail((ss + tt) / 2 + std::sqrt(half * half + st * st));
+}
+
+/// `glow`: what multiplies the emission.
+Shade TriangleShade::shade(Float4 texel, Float4 tint, Float4 glow) const {
   tint *= float4(material_->color);
   const float alpha = texel[3] * tint[3] / static_cast<float>(full_light);
   uint8_t cover = 255;
@@ -117,13 +126,18 @@ Shade TriangleShade::shade(Float4 texel, Float4 tint) const {
     texel *= static_cast<float>(full_light) / texel[3];
   texel *= tint;
   texel = texel < all_light ? texel : all_light;
+  if (material_->emits()) {
+    const glm::vec3& emission = material_->emission;
+    texel += glow * Float4{emission.r, emission.g, emission.b, 0};
+    texel = texel < all_light ? texel : all_light;
+  }
   const Int4 light = __builtin_convertvector(texel + 0.5f, Int4);
   return {static_cast<uint16_t>(light[0]), static_cast<uint16_t>(light[1]), static_cast<uint16_t>(light[2]),
           cover};
 }
 
 Shade TriangleShade::at(int x, int y, int z) const {
-  if (!texture_ && !tinted_) return plain_;
+  if (!color_.texture && !emission_.texture && !tinted_) return plain_;
   const Place from{x + 0.5 - corners_[0][0], y + 0.5 - corners_[0][1], z + 0.5 - corners_[0][2]};
   double b = weight_[0] + dot(gradient_[0], from), c = weight_[1] + dot(gradient_[1], from);
   if (double a = 1 - b - c; a < 0 || b < 0 || c < 0) {
@@ -131,14 +145,19 @@ Shade TriangleShade::at(int x, int y, int z) const {
     const double sum = a + b + c;
     b /= sum, c /= sum;
   }
-  Float4 texel = all_light, tint{1, 1, 1, 1};
-  if (texture_)
-    texel = texture_->sample(u_[0] + b * u_[1] + c * u_[2], v_[0] + b * v_[1] + c * v_[2], material_->wrap_u,
-                             material_->wrap_v, detail_);
+  const auto sample = [&](const Map& map, TextureWrap wrap_u, TextureWrap wrap_v, TextureFilter filter) {
+    return map.texture->sample(map.u[0] + b * map.u[1] + c * map.u[2], map.v[0] + b * map.v[1] + c * map.v[2],
+                               wrap_u, wrap_v, filter, map.detail);
+  };
+  Float4 texel = all_light, tint{1, 1, 1, 1}, glow = all_light;
+  if (color_.texture) texel = sample(color_, material_->wrap_u, material_->wrap_v, material_->filter);
+  if (emission_.texture)
+    glow =
+        sample(emission_, material_->emission_wrap_u, material_->emission_wrap_v, material_->emission_filter);
   if (tinted_)
     tint = tint_[0] + (tint_[1] - tint_[0]) * static_cast<float>(b) +
            (tint_[2] - tint_[0]) * static_cast<float>(c);
-  return shade(texel, tint);
+  return shade(texel, tint, glow);
 }
 
 double TriangleShade::area_in(int x, int y, int z) const {

@@ -1,6 +1,7 @@
 // The colour of a triangle at a voxel.
 #pragma once
 
+#include <algorithm>
 #include <array>
 #include <cstdint>
 #include <vector>
@@ -12,14 +13,24 @@
 
 namespace voxkit::color {
 
-/// A mesh on the grid of a surface.
+/// A mesh on the grid of a surface. Points are triangles whose corners are one, behind the others.
 struct VoxelScene {
   SurfaceKind kind = SurfaceKind::thin;
   std::vector<SnappedTriangle> corners;  ///< of mesh.triangles
   Mesh mesh;                             ///< without its textures and positions
+  size_t first_point = SIZE_MAX;
   std::vector<TextureLevels> textures;
-  std::vector<int32_t> texture_of;  ///< of a material: index into textures, or -1
+  /// Of a material: indices into textures, or -1.
+  std::vector<int32_t> texture_of, emission_texture_of;
+
+  /// Which voxels a triangle is in.
+  TriangleCells cells(uint32_t triangle) const {
+    return {corners[triangle], triangle < first_point ? kind : SurfaceKind::conservative};
+  }
 };
+
+/// Cover from which on a voxel is there: a half of 255. Voxels are there or not.
+inline constexpr uint8_t least_cover = 128;
 
 /// Linear light in 16 bits, and how much of the area is there, 1..255; 0 = nothing is. In one register: parts
 /// of a word that are written one by one wait for each other when it is read.
@@ -49,14 +60,20 @@ class TriangleShade {
 
  private:
   using Place = std::array<double, 3>;
-  Shade shade(Float4 texel, Float4 tint) const;
+  /// A texture on the triangle.
+  struct Map {
+    const TextureLevels* texture = nullptr;
+    double u[3] = {0, 0, 0}, v[3] = {0, 0, 0};  ///< at the first corner, and from there to the others
+    TextureLevels::Detail detail;
+  };
+  void lay(Map& map, const TextureLevels& texture, const std::vector<glm::vec2>& uvs,
+           const MeshTriangle& triangle) const;
+  Shade shade(Float4 texel, Float4 tint, Float4 glow) const;
   std::array<Place, 3> corners_{};
-  Place gradient_[2];                           ///< of the weights of the second and the third corner
-  double weight_[2] = {0, 0};                   ///< at the first corner
-  double u_[3] = {0, 0, 0}, v_[3] = {0, 0, 0};  ///< at the first corner, and from there to the others
+  Place gradient_[2];          ///< of the weights of the second and the third corner
+  double weight_[2] = {0, 0};  ///< at the first corner
+  Map color_, emission_;
   const MeshMaterial* material_;
-  const TextureLevels* texture_ = nullptr;
-  TextureLevels::Detail detail_;
   bool tinted_ = false;  ///< has colours at its corners
   Float4 tint_[3];
   Shade plain_;  ///< where it is the same everywhere
@@ -69,9 +86,11 @@ class ShadeMean {
     // Whatever is there counts; order does not matter.
     const uint64_t weight = (1 + static_cast<uint64_t>(area * 65536)) * shade.cover();
     weight_ += weight;
+    most_ = std::max(most_, shade.cover());
     for (size_t c = 0; c < 3; ++c) light_[c] += static_cast<unsigned __int128>(weight) * shade.light(c);
   }
-  bool empty() const { return weight_ == 0; }
+  /// Whether one of them covers enough.
+  bool there() const { return most_ >= least_cover; }
   std::array<uint16_t, 3> light() const {
     std::array<uint16_t, 3> out;
     for (size_t c = 0; c < 3; ++c) out[c] = static_cast<uint16_t>((light_[c] + weight_ / 2) / weight_);
@@ -79,6 +98,7 @@ class ShadeMean {
   }
 
  private:
+  uint8_t most_ = 0;
   unsigned __int128 weight_ = 0;
   std::array<unsigned __int128, 3> light_{};
 };

@@ -34,7 +34,7 @@ uint64_t TileWork::bytes(int bits) {
 void divide(const VoxelScene& scene, const Cube& cube, std::span<const uint32_t> triangles,
             std::array<std::vector<uint32_t>, 8>& lists) {
   for (const uint32_t triangle : triangles) {
-    const TriangleCells cells(scene.corners[triangle], scene.kind);
+    const TriangleCells cells = scene.cells(triangle);
     for (int child = 0; child < 8; ++child)
       if (cells.touches(child_of(cube, child))) lists[static_cast<size_t>(child)].push_back(triangle);
   }
@@ -70,14 +70,13 @@ void TileWork::one_voxel(const VoxelScene& scene, const Cube& cube, std::span<co
                          std::vector<SurfaceVoxel>& out) {
   ShadeMean mean;
   for (const uint32_t triangle : triangles)
-    TriangleCells(scene.corners[triangle], scene.kind)
-        .each_cell(
-            cube, [] {},
-            [&](uint64_t) {
-              const TriangleShade shade(scene, triangle, cube.lo);
-              if (const Shade seen = shade.at(0, 0, 0); seen.cover()) mean.add(seen, shade.area_in(0, 0, 0));
-            });
-  if (!mean.empty()) out.push_back({first_place(cube), stored(mean)});
+    scene.cells(triangle).each_cell(
+        cube, [] {},
+        [&](uint64_t) {
+          const TriangleShade shade(scene, triangle, cube.lo);
+          if (const Shade seen = shade.at(0, 0, 0); seen.cover()) mean.add(seen, shade.area_in(0, 0, 0));
+        });
+  if (mean.there()) out.push_back({first_place(cube), stored(mean)});
 }
 
 /// False where there are too many pairs.
@@ -89,17 +88,16 @@ bool TileWork::collect(const VoxelScene& scene, const Cube& cube, std::span<cons
   for (const uint32_t triangle : triangles) {
     const auto number = static_cast<uint64_t>(shades_.size());
     const size_t before = count_;
-    TriangleCells(scene.corners[triangle], scene.kind)
-        .each_cell(
-            cube,
-            [&] {
-              if (count_ > limit) {
-                fits = false;
-                count_ = before;
-              }
-              if (pairs_.size() < count_ + row) pairs_.resize(std::max(2 * pairs_.size(), count_ + row));
-            },
-            [&](uint64_t code) { pairs_[count_++] = code << 32 | number; });
+    scene.cells(triangle).each_cell(
+        cube,
+        [&] {
+          if (count_ > limit) {
+            fits = false;
+            count_ = before;
+          }
+          if (pairs_.size() < count_ + row) pairs_.resize(std::max(2 * pairs_.size(), count_ + row));
+        },
+        [&](uint64_t code) { pairs_[count_++] = code << 32 | number; });
     if (!fits) return false;
     if (count_ > before) shades_.emplace_back(scene, triangle, cube.lo);
   }
@@ -146,13 +144,14 @@ void TileWork::color(const Cube& cube, std::vector<SurfaceVoxel>& out) const {
     size_t end = i + 1;
     while (end < count_ && pairs_[end] >> 32 == code) ++end;
     if (end == i + 1) {
-      if (const Shade seen = shade_of(i).at(at.x, at.y, at.z); seen.cover()) put(code, stored(seen));
+      if (const Shade seen = shade_of(i).at(at.x, at.y, at.z); seen.cover() >= least_cover)
+        put(code, stored(seen));
     } else {
       ShadeMean mean;
       for (size_t pair = i; pair < end; ++pair)
         if (const Shade seen = shade_of(pair).at(at.x, at.y, at.z); seen.cover())
           mean.add(seen, shade_of(pair).area_in(at.x, at.y, at.z));
-      if (!mean.empty()) put(code, stored(mean));
+      if (mean.there()) put(code, stored(mean));
     }
     i = end;
   }

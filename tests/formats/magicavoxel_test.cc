@@ -55,17 +55,17 @@ std::string shape(uint32_t id, uint32_t model) {
 
 class MagicaVoxel : public testing::Test {
  protected:
-  Result<VoxelScene> read(const std::string& bytes) {
+  Result<VoxelScene> read(const std::string& bytes, uint32_t frame = 0) {
     const auto path = std::filesystem::temp_directory_path() /
                       ("voxkit-" + std::to_string(getpid()) + "-" +
                        testing::UnitTest::GetInstance()->current_test_info()->name() + ".vox");
     std::ofstream(path, std::ios::binary) << bytes;
-    auto scene = read_magicavoxel(path.string(), ctx_);
+    auto scene = read_magicavoxel(path.string(), ctx_, frame);
     std::filesystem::remove(path);
     return scene;
   }
-  std::vector<Place> places(const std::string& bytes) {
-    auto scene = read(bytes);
+  std::vector<Place> places(const std::string& bytes, uint32_t frame = 0) {
+    auto scene = read(bytes, frame);
     EXPECT_TRUE(scene) << scene.error().what;
     std::vector<Place> all;
     if (scene)
@@ -129,6 +129,56 @@ TEST_F(MagicaVoxel, HiddenPartsAreLeftOut) {
   EXPECT_EQ(places(file(two + transform(4, 5, {}, {}, 3) + shape(5, 0) +
                         chunk("LAYR", number(3) + dictionary({{"_hidden", "1"}}) + number(~0u)))),
             (std::vector<Place>{}));
+}
+
+TEST_F(MagicaVoxel, FramesOfAScene) {
+  // A shape of two models, the second from frame 5 on, which moves at frame 2.
+  const std::string models = model(1, 1, 1, {{0, 0, 0, 1}}) + model(3, 1, 1, {{2, 0, 0, 2}});
+  const std::string moving = chunk(
+      "nTRN", number(0) + dictionary({}) + number(1) + number(~0u) + number(~0u) + number(2) +
+                  dictionary({{"_t", "10 0 0"}, {"_f", "0"}}) + dictionary({{"_t", "20 0 0"}, {"_f", "2"}}));
+  const std::string shapes =
+      chunk("nSHP", number(1) + dictionary({}) + number(2) + number(0) + dictionary({{"_f", "0"}}) +
+                        number(1) + dictionary({{"_f", "5"}}));
+  const std::string scene = file(models + moving + shapes);
+  EXPECT_EQ(places(scene), (std::vector<Place>{{10, 0, -1}}));
+  EXPECT_EQ(places(scene, 1), (std::vector<Place>{{10, 0, -1}}));
+  EXPECT_EQ(places(scene, 2), (std::vector<Place>{{20, 0, -1}}));
+  EXPECT_EQ(places(scene, 4), (std::vector<Place>{{20, 0, -1}}));
+  EXPECT_EQ(places(scene, 5), (std::vector<Place>{{21, 0, -1}}));
+  ASSERT_EQ(read(scene)->notes.size(), 1u);
+  EXPECT_EQ(read(scene)->notes[0], "frame 0 of 6 is read: --frame N takes another");
+  const auto none = read(scene, 6);
+  ASSERT_FALSE(none);
+  EXPECT_EQ(none.error().code, ErrorCode::usage);
+  expect_refused(
+      file(models + moving +
+           chunk("nSHP", number(1) + dictionary({}) + number(1) + number(0) + dictionary({{"_f", "x"}}))),
+      "frame \"x\"");
+}
+
+TEST_F(MagicaVoxel, ModelsWithoutASceneAreFrames) {
+  const std::string pack =
+      file(chunk("PACK", number(2)) + model(1, 1, 1, {{0, 0, 0, 1}}) + model(2, 1, 1, {{1, 0, 0, 1}}));
+  EXPECT_EQ(places(pack), (std::vector<Place>{{0, 0, -1}}));
+  EXPECT_EQ(places(pack, 1), (std::vector<Place>{{1, 0, -1}}));
+  EXPECT_FALSE(read(pack, 2));
+  EXPECT_EQ(read(pack)->notes.size(), 1u);
+  EXPECT_TRUE(read(file(model(1, 1, 1, {{0, 0, 0, 1}})))->notes.empty());
+}
+
+TEST_F(MagicaVoxel, WhatVoxelsCannotSayIsNoted) {
+  const std::string glass = chunk("MATL", number(1) + dictionary({{"_type", "_glass"}, {"_trans", "0.9"}}));
+  const auto scene = read(file(model(1, 1, 1, {{0, 0, 0, 1}}) + glass));
+  ASSERT_TRUE(scene);
+  ASSERT_EQ(scene->notes.size(), 1u);
+  EXPECT_NE(scene->notes[0].find("materials of 1 colors"), std::string::npos);
+  // Of a colour that no voxel has it does not matter.
+  EXPECT_TRUE(read(file(model(1, 1, 1, {{0, 0, 0, 2}}) + glass))->notes.empty());
+  const auto hidden =
+      read(file(model(1, 1, 1, {{0, 0, 0, 1}}) + transform(0, 1, {}, {{"_hidden", "1"}}) + shape(1, 0)));
+  ASSERT_TRUE(hidden);
+  EXPECT_EQ(hidden->notes, (std::vector<std::string>{"dropped: 1 parts of the scene that are hidden"}));
 }
 
 TEST_F(MagicaVoxel, BrokenFilesAreRefused) {

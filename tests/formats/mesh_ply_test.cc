@@ -1,6 +1,8 @@
 // PLY files, which our own reader reads.
 #include <gtest/gtest.h>
 
+#include <algorithm>
+
 #include "formats/image/image.h"
 #include "formats/mesh/mesh.h"
 #include "formats/mesh/mesh_ply.h"
@@ -122,6 +124,84 @@ TEST_F(MeshPlyTest, Refusals) {
   ctx_.memory = &small;
   expect_error(file("3", "element face 1\nproperty list ushort int vertex_indices\n", points + many),
                "--max-memory", ErrorCode::limit);
+}
+
+TEST_F(MeshPlyTest, ColoursOfFaces) {
+  const std::string vertices = "element vertex 4\nproperty float x\nproperty float y\nproperty float z\n";
+  const std::string faces =
+      "element face 2\nproperty list uchar int vertex_indices\nproperty uchar red\n"
+      "property uchar green\nproperty uchar blue\n";
+  const std::string data = "0 0 0\n1 0 0\n1 1 0\n0 1 0\n", two = "3 0 1 2 255 0 0\n3 0 2 3 0 0 255\n";
+  const auto check = [&](const Mesh& mesh) {
+    ASSERT_EQ(mesh.triangles.size(), 2u);
+    for (size_t i = 0; i < 2; ++i)
+      for (const uint32_t v : mesh.triangles[i].vertices)
+        EXPECT_EQ(mesh.colors[v], i ? glm::vec4(0, 0, 1, 1) : glm::vec4(1, 0, 0, 1));
+  };
+  check(read("ply\nformat ascii 1.0\n" + vertices + faces + "end_header\n" + data + two));
+  // Faces before their vertices.
+  check(read("ply\nformat ascii 1.0\n" + faces + vertices + "end_header\n" + two + data));
+  // Vertices have colours, too: these count.
+  const Mesh both =
+      read("ply\nformat ascii 1.0\n" + vertices + "property int r\nproperty int g\nproperty int b\n" + faces +
+           "end_header\n0 0 0 0 255 0\n1 0 0 0 255 0\n1 1 0 0 255 0\n0 1 0 0 255 0\n" + two);
+  EXPECT_EQ(both.colors[0], glm::vec4(0, 1, 0, 1));
+  ASSERT_EQ(both.notes.size(), 1u);
+  EXPECT_NE(both.notes[0].find("colors of faces"), std::string::npos);
+}
+
+TEST_F(MeshPlyTest, Strips) {
+  const std::string head =
+      "ply\nformat ascii 1.0\nelement vertex 6\nproperty float x\nproperty float y\nproperty float z\n"
+      "element tristrips 1\nproperty list int int vertex_indices\nend_header\n"
+      "0 0 0\n1 0 0\n0 1 0\n1 1 0\n0 2 0\n1 2 0\n";
+  const auto area = [](const Mesh& mesh) {
+    double sum = 0;
+    for (const MeshTriangle& t : mesh.triangles) {
+      const glm::dvec3 u = mesh.positions[t.vertices[1]] - mesh.positions[t.vertices[0]],
+                       v = mesh.positions[t.vertices[2]] - mesh.positions[t.vertices[0]];
+      sum += (u.x * v.y - u.y * v.x) / 2;
+    }
+    return sum;
+  };
+  EXPECT_EQ(area(read(head + "6 0 1 2 3 4 5\n")), 2);
+  EXPECT_EQ(area(read(head + "9 0 1 2 3 -1 2 3 4 5\n")), 2);
+  expect_error(head + "3 0 1 6\n", "vertex 6: expected one below 6");
+  expect_error(head + "3 0 1 -2\n", "expected one below 6");
+}
+
+TEST_F(MeshPlyTest, NamesOfColoursAndWhatIsDropped) {
+  for (const char* names : {"r g b", "red green blue", "diffuse_red diffuse_green diffuse_blue"}) {
+    std::string text(names), properties;
+    for (size_t at = 0; at < text.size();) {
+      const size_t end = std::min(text.find(' ', at), text.size());
+      properties += "property uchar " + text.substr(at, end - at) + "\n";
+      at = end + 1;
+    }
+    const Mesh mesh = read(
+        "ply\nformat ascii 1.0\nelement vertex 3\nproperty float x\nproperty float y\nproperty float z\n" +
+        properties +
+        "property float nx\nelement face 1\nproperty list uchar int vertex_indices\nend_header\n"
+        "0 0 0 255 0 0 1\n1 0 0 255 0 0 1\n0 1 0 255 0 0 1\n3 0 1 2\n");
+    ASSERT_EQ(mesh.colors.size(), 3u) << names;
+    EXPECT_EQ(mesh.colors[2], glm::vec4(1, 0, 0, 1));
+    ASSERT_EQ(mesh.notes.size(), 1u);
+    EXPECT_EQ(mesh.notes[0], "dropped: nx of vertex");
+  }
+}
+
+TEST_F(MeshPlyTest, SeveralTextures) {
+  const std::string head =
+      "ply\nformat ascii 1.0\ncomment TextureFile a.png\ncomment TextureFile b.png\nelement vertex 3\n"
+      "property float x\nproperty float y\nproperty float z\nelement face 2\n"
+      "property list uchar int vertex_indices\nproperty list uchar float texcoord\n"
+      "property int texnumber\nend_header\n0 0 0\n1 0 0\n0 1 0\n3 0 1 2 6 0 0 1 0 0 1 1\n";
+  auto parts = read_ply(put("a.ply", head + "3 0 1 2 6 0 0 1 0 0 1 0\n"), ctx_);
+  ASSERT_TRUE(parts);
+  ASSERT_EQ(parts->maps.size(), 2u);
+  EXPECT_EQ(parts->maps[parts->mesh.triangles[0].material].color.name, "b.png");
+  EXPECT_EQ(parts->maps[parts->mesh.triangles[1].material].color.name, "a.png");
+  expect_error(head + "3 0 1 2 6 0 0 1 0 0 1 2\n", "a face of texture 2: there are 2");
 }
 
 }  // namespace

@@ -2,56 +2,26 @@
 #include "formats/mesh/mesh.h"
 
 #include <gtest/gtest.h>
+#include <sys/stat.h>
 
 #include <cmath>
 #include <set>
 
-#include "formats/image/image.h"
 #include "formats/mesh/mesh_parts.h"
-#include "formats/module.h"
-#include "tests/formats/file_format_test.h"
-#include "tests/formats/mesh_files.h"
+#include "tests/formats/mesh_file_test.h"
 
 namespace voxkit {
 namespace {
 
-class MeshFileTest : public FileFormatTest {
+class MeshFileTest : public MeshReadingTest {
  protected:
   void SetUp() override {
-    FileFormatTest::SetUp();
-    if (!load_module(module_folder(), {"mesh", "reading meshes", ""})) GTEST_SKIP() << "no assimp";
-    if (!load_module(module_folder(), {"image_stack", "reading images", ""}))
-      GTEST_SKIP() << "no OpenImageIO";
-  }
-
-  Mesh read(const std::string& name, const std::string& content) {
-    auto mesh = read_mesh(put(name, content), ctx_);
-    EXPECT_TRUE(mesh) << mesh.error().what;
-    return mesh ? std::move(*mesh) : Mesh{};
-  }
-  void expect_error(const std::string& name, const std::string& content, const std::string& part,
-                    ErrorCode code = ErrorCode::input) {
-    const auto mesh = read_mesh(put(name, content), ctx_);
-    ASSERT_FALSE(mesh) << "accepted; expected an error with: " << part;
-    EXPECT_EQ(mesh.error().code, code);
-    EXPECT_NE(mesh.error().what.find(part), std::string::npos) << mesh.error().what;
-    EXPECT_EQ(mesh.error().what.find('\n'), std::string::npos) << mesh.error().what;
-  }
-  /// A picture of 2 x 2: red, green over blue, white; or with the alpha of each.
-  std::string picture(const std::string& name, const std::vector<float>& alphas = {}) {
-    const float texels[4][3] = {{255, 0, 0}, {0, 255, 0}, {0, 0, 255}, {255, 255, 255}};
-    auto image = Image::create(2, 2, alphas.empty() ? 3 : 4, SampleType::u8, ctx_);
-    float* out = image->row(0);
-    for (size_t i = 0; i < 4; ++i) {
-      out = std::copy_n(texels[i], 3, out);
-      if (!alphas.empty()) *out++ = alphas[i];
-    }
-    const Status written = write_image(path(name), *image, true);
-    EXPECT_TRUE(written) << written.error().what;
-    return get(path(name));
+    MeshReadingTest::SetUp();
+    if (!reads_images()) GTEST_SKIP() << "no OpenImageIO";
   }
   static void expect_square(const Mesh& mesh) {
     ASSERT_EQ(mesh.triangles.size(), 2u);
+    ASSERT_EQ(mesh.uvs.size(), mesh.positions.size());
     double area = 0;
     for (const MeshTriangle& triangle : mesh.triangles) {
       const auto& [a, b, c] = triangle.vertices;
@@ -64,10 +34,6 @@ class MeshFileTest : public FileFormatTest {
       }
     }
     EXPECT_EQ(area, 2);
-  }
-  static std::array<int, 4> texel(const Mesh& mesh, size_t texture, int64_t x, int64_t y) {
-    const uint8_t* p = mesh.textures[texture].data() + 4 * (y * mesh.textures[texture].width + x);
-    return {p[0], p[1], p[2], p[3]};
   }
 };
 
@@ -104,8 +70,12 @@ TEST_F(MeshFileTest, Obj) {
 
 TEST_F(MeshFileTest, TheSameSquareOfEachFormat) {
   expect_square(read("a.obj", obj_square()));
-  expect_square(read("a.gltf", GltfSquare{}.gltf()));
-  expect_square(read("a.glb", GltfSquare{}.glb()));
+  picture("a.png");
+  GltfSquare file;  // coordinates are read where there is a texture
+  file.material = R"({"pbrMetallicRoughness":{"baseColorTexture":{"index":0}}})";
+  file.rest = R"(,"textures":[{"source":0}],"images":[{"uri":"a.png"}])";
+  expect_square(read("a.gltf", file.gltf()));
+  expect_square(read("a.glb", file.glb()));
 }
 
 TEST_F(MeshFileTest, PlyColoursAreStoredValues) {
@@ -371,6 +341,32 @@ TEST_F(MeshFileTest, BrokenTextures) {
   expect_error("a.glb", file.glb(), "expected PNG or JPEG");
 }
 
+TEST_F(MeshFileTest, LargeTexturesAreRefusedBeforeTheyAreDecoded) {
+  // Only their heads are there: 2^16 x 2^13 texels, and a side that is too long.
+  put("m.mtl", "newmtl a\nmap_Kd a.png\n");
+  const std::string obj = obj_square("mtllib m.mtl\nusemtl a\n");
+  const std::string png = std::string("\x89PNG\r\n\x1a\n\0\0\0\rIHDR", 16);
+  put("a.png", png + std::string("\0\1\0\0\0\0\x20\0\x08\2\0\0\0", 13));
+  expect_error("a.obj", obj,
+               "a texture of 65536 x 8192 texels: expected 1 to 65536 a side and 268435456 in all");
+  put("a.png", png + std::string("\0\1\0\1\0\0\0\1\x08\2\0\0\0", 13));
+  expect_error("a.obj", obj, "a texture of 65537 x 1 texels");
+  put("m.mtl", "newmtl a\nmap_Kd a.jpg\n");
+  put("a.jpg", std::string("\xff\xd8\xff\xe0\0\4ab\xff\xc2\0\x11\x08\xff\xff\xff\xfe\3", 18));
+  expect_error("a.obj", obj, "a texture of 65534 x 65535 texels");
+}
+
+TEST_F(MeshFileTest, OnlyRegularFilesAreOpened) {
+  ASSERT_EQ(mkfifo(path("pipe").c_str(), 0600), 0);
+  put("m.mtl", "newmtl a\nmap_Kd pipe\n");
+  expect_error("a.obj", obj_square("mtllib m.mtl\nusemtl a\n"), "pipe is missing");
+  expect_error("a.obj", obj_square("mtllib pipe\n"), "pipe is missing");
+  expect_error("a.gltf", GltfSquare{}.json("pipe"), "pipe is missing");
+  put("m.mtl", "newmtl a\nmap_Kd /dev/zero\n");
+  expect_error("a.obj", obj_square("mtllib m.mtl\nusemtl a\n"), "/dev/zero is missing");
+  expect_error("a.gltf", GltfSquare{}.json("https://example.org/a.bin"), "a.bin is missing");
+}
+
 TEST_F(MeshFileTest, NumbersThatAreNone) {
   for (const char* bad : {"nan", "inf", "-inf", "1e39"}) {
     expect_error("a.obj", fmt::format("v 0 0 0\nv 1 0 {}\nv 0 1 0\nf 1 2 3\n", bad),
@@ -387,7 +383,7 @@ TEST_F(MeshFileTest, TrianglesWithoutAreaAreDropped) {
   EXPECT_EQ(read("a.obj", vertices + "f 1 2 3\nf 1 2 4\nf 1 1 2\nf 2 2 2\np 1\nl 1 2\n").triangles.size(),
             1u);
   expect_error("a.obj", vertices + "f 1 2 4\n", "without triangles that have an area");
-  expect_error("a.obj", "# nothing\n", "cannot read the mesh");
+  expect_error("a.obj", "# nothing\n", "a mesh without triangles");
   expect_error("a.obj", vertices + "f 1 2 9\n", "out of range");
 }
 

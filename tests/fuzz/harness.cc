@@ -139,7 +139,10 @@ Verdict read_mesh_file(const std::string& path) {
   if (const auto mesh = read_mesh(path, ctx); !mesh) {
     verdict = judge(mesh.error());
   } else {
-    if (mesh->triangles.empty()) return fault("a mesh of nothing");
+    if (mesh->triangles.empty() && mesh->points.empty()) return fault("a mesh of nothing");
+    for (const MeshPoint& point : mesh->points)
+      if (point.vertex >= mesh->positions.size() || point.material >= mesh->materials.size())
+        return fault("a point that is not there");
     for (const MeshTriangle& triangle : mesh->triangles)
       for (const uint32_t v : triangle.vertices)
         if (v >= mesh->positions.size() || !std::isfinite(mesh->positions[v].x + mesh->positions[v].z))
@@ -294,8 +297,8 @@ const std::vector<Reader>& readers() {
       {"openvdb", "openvdb", read_openvdb, openvdb_seeds},
       {"dicom", "dicom", read_dicom, dicom_seeds},
       {"mesh_ply", nullptr, read_mesh_ply, mesh_ply_seeds},
-      {"mesh_gltf", "mesh", read_mesh_gltf, mesh_gltf_seeds},
-      {"mesh_obj", "mesh", read_mesh_obj, mesh_obj_seeds},
+      {"mesh_gltf", nullptr, read_mesh_gltf, mesh_gltf_seeds},
+      {"mesh_obj", nullptr, read_mesh_obj, mesh_obj_seeds},
       {"jpeg", "jpeg", read_jpeg, jpeg_seeds},
       {"jp2", "jp2", read_jp2, jp2_seeds},
       {"png", "png", read_png, png_seeds},

@@ -106,5 +106,31 @@ TEST(PointSurface, OnePointAndWhatCannotBe) {
   EXPECT_EQ(poor.error().code, ErrorCode::limit);
 }
 
+/// A cloud that says it has more points than come.
+class HoledCloud final : public PointCloud {
+ public:
+  explicit HoledCloud(uint64_t come) : come_(come) { size_ = 3; }
+  Status read(const Sink& sink) const override {
+    const std::vector<CloudPoint> points(come_, {{1, 2, 3}, {4, 5, 6}});
+    return sink(points);
+  }
+
+ private:
+  uint64_t come_;
+};
+
+TEST(PointSurface, WhatIsDroppedIsCounted) {
+  MemoryBudget memory;
+  Context ctx;
+  ctx.memory = &memory;
+  const auto surface = surface_of_points(std::make_unique<const HoledCloud>(1), 8, ctx);
+  ASSERT_TRUE(surface);
+  ASSERT_EQ((*surface)->notes().size(), 1u);
+  EXPECT_NE((*surface)->notes()[0].find("2 of 3 points"), std::string::npos);
+  const auto none = surface_of_points(std::make_unique<const HoledCloud>(0), 8, ctx);
+  ASSERT_FALSE(none);
+  EXPECT_EQ(none.error().code, ErrorCode::input);
+}
+
 }  // namespace
 }  // namespace voxkit::color

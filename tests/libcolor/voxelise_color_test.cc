@@ -170,13 +170,17 @@ TEST_F(VoxeliseColorTest, CutOff) {
                                   static_cast<uint8_t>(x < 8 ? 255 : 20)};
   };
   MeshMaterial material;
-  for (const auto& [mode, cutoff, factor, columns] : {std::tuple(AlphaMode::opaque, 0.5f, 1.0f, 16u),
-                                                      {AlphaMode::mask, 0.5f, 1.0f, 8u},
-                                                      {AlphaMode::mask, 0.05f, 1.0f, 16u},
-                                                      {AlphaMode::mask, 0.5f, 0.4f, 0u},
-                                                      {AlphaMode::blend, 0.5f, 1.0f, 16u},
-                                                      {AlphaMode::blend, 0.5f, 0.02f, 8u},
-                                                      {AlphaMode::blend, 0.5f, 0.0f, 0u}}) {
+  for (const auto& [mode, cutoff, factor, columns] :
+       {std::tuple(AlphaMode::opaque, 0.5f, 1.0f, 16u),
+        {AlphaMode::mask, 0.5f, 1.0f, 8u},
+        {AlphaMode::mask, 0.05f, 1.0f, 16u},
+        {AlphaMode::mask, 0.5f, 0.4f, 0u},
+        {AlphaMode::blend, 0.5f, 1.0f, 8u},
+        {AlphaMode::blend, 0.5f, 0.9f, 8u},
+        {AlphaMode::blend, 0.5f, 0.5f, 6u},  // its borders are mixed with what is clear
+        {AlphaMode::blend, 0.5f, 0.49f, 0u},
+        {AlphaMode::blend, 0.5f, 0.02f, 0u},
+        {AlphaMode::blend, 0.5f, 0.0f, 0u}}) {
     SCOPED_TRACE(testing::Message() << static_cast<int>(mode) << " " << cutoff << " " << factor);
     material.alpha_mode = mode;
     material.alpha_cutoff = cutoff;
@@ -187,7 +191,7 @@ TEST_F(VoxeliseColorTest, CutOff) {
       const uint32_t x = morton_place(place).x;
       EXPECT_NEAR(color.g, 180, 1);
       // What is not there gives no colour: not even next to the border.
-      EXPECT_NEAR(color.r, x < 8 ? 90 : 255, mode == AlphaMode::mask && cutoff > 0.1f ? 2 : 255) << x;
+      EXPECT_NEAR(color.r, x < 8 ? 90 : 255, columns < 16u ? 2 : 255) << x;
     }
   }
 }
@@ -200,6 +204,108 @@ TEST_F(VoxeliseColorTest, BlendedCountByTheirAlpha) {
   add_square(mesh, 1, 1);
   for (const SurfaceVoxel& voxel : voxelise(std::move(mesh), {4}))
     expect_near(voxel.color, stored(0.8), stored(0.2), 0);
+}
+
+TEST_F(VoxeliseColorTest, WhatIsBlendedIsThereFromAHalfOn) {
+  const auto with = [&](AlphaMode mode, float alpha) {
+    Mesh mesh;
+    mesh.materials = {plain(1, 0, 0, alpha), plain(0, 1, 0)};
+    mesh.materials[0].alpha_mode = mode;
+    add_square(mesh, 1, 0);
+    add_square(mesh, 1, 1, 3);  // opaque, elsewhere
+    auto surface = make_surface(std::move(mesh), {4}, ctx_);
+    EXPECT_TRUE(surface);
+    const bool noted = !(*surface)->notes().empty();
+    size_t red = 0;
+    EXPECT_TRUE((*surface)->read(ctx_, [&](std::span<const SurfaceVoxel> run) -> Status {
+      for (const SurfaceVoxel& voxel : run) red += voxel.color.r == 255;
+      return {};
+    }));
+    return std::pair(red > 0, noted);
+  };
+  EXPECT_EQ(with(AlphaMode::blend, 0.02f), std::pair(false, true));
+  EXPECT_EQ(with(AlphaMode::blend, 0.49f), std::pair(false, true));
+  EXPECT_EQ(with(AlphaMode::blend, 0.5f), std::pair(true, true));
+  EXPECT_EQ(with(AlphaMode::blend, 0.9f), std::pair(true, true));
+  EXPECT_EQ(with(AlphaMode::blend, 1), std::pair(true, false));
+  EXPECT_EQ(with(AlphaMode::opaque, 0.02f), std::pair(true, false));
+}
+
+TEST_F(VoxeliseColorTest, EmissionIsAdded) {
+  const auto lamp = [&](bool add, bool textured) {
+    Mesh mesh;
+    mesh.materials = {plain(0.25f, 0, 0)};
+    mesh.materials[0].emission = {0.25f, 0.5f, 4};
+    add_square(mesh, 1);
+    if (textured) {
+      // Its own coordinates: what is black in the lower half there is to the left.
+      mesh.textures.push_back(texture(16, 16, [](int64_t x, int64_t) {
+        const auto value = static_cast<uint8_t>(x < 8 ? 0 : 255);
+        return std::array<uint8_t, 4>{value, value, value, 255};
+      }));
+      mesh.materials[0].emission_texture = 0;
+      for (const glm::dvec3& p : mesh.positions) mesh.emission_uvs.push_back(glm::vec2(p.y, p.x));
+    }
+    auto surface = make_surface(std::move(mesh), {.resolution = 16, .emission = add}, ctx_);
+    EXPECT_TRUE(surface);
+    EXPECT_EQ((*surface)->emits(), add);
+    EXPECT_EQ((*surface)->notes().size(), add ? 0u : 1u);
+    std::map<uint64_t, Rgb> voxels;
+    EXPECT_TRUE((*surface)->read(ctx_, [&](std::span<const SurfaceVoxel> run) -> Status {
+      for (const SurfaceVoxel& voxel : run) voxels[voxel.place] = voxel.color;
+      return {};
+    }));
+    return voxels;
+  };
+  for (const auto& [place, color] : lamp(true, false)) expect_near(color, stored(0.5), stored(0.5), 255);
+  for (const auto& [place, color] : lamp(false, false)) expect_near(color, stored(0.25), 0, 0);
+  const auto half = lamp(true, true);
+  for (uint32_t x = 0; x < 16; ++x) {
+    expect_near(half.at(at(x, 13)), stored(0.5), stored(0.5), 255);
+    expect_near(half.at(at(x, 2)), stored(0.25), 0, 0);
+  }
+}
+
+TEST_F(VoxeliseColorTest, NearestTexelsAreAsTheyAre) {
+  const auto chess = [](int64_t x, int64_t y) {
+    const auto value = static_cast<uint8_t>((x ^ y) & 1 ? 255 : 0);
+    return std::array<uint8_t, 4>{value, value, value, 255};
+  };
+  MeshMaterial material;
+  material.filter = TextureFilter::nearest;
+  for (const TextureWrap wrap : {TextureWrap::repeat, TextureWrap::clamp, TextureWrap::mirror}) {
+    material.wrap_u = material.wrap_v = wrap;
+    for (const auto& [place, color] : draw(texture(4, 4, chess), 32, 1, material)) {
+      const auto p = morton_place(place);
+      const int want = ((p.x / 8) ^ ((31 - p.y) / 8)) & 1 ? 255 : 0;
+      EXPECT_EQ(color.r, want) << p.x << " " << p.y;
+    }
+  }
+  // Smaller than voxels they are averaged all the same.
+  for (const auto& [place, color] : draw(texture(64, 64, chess), 8, 1, material))
+    expect_near(color, stored(0.5), stored(0.5), stored(0.5));
+}
+
+TEST_F(VoxeliseColorTest, PointsOfMeshes) {
+  const auto mesh_of = [&](bool square, size_t points) {
+    Mesh mesh;
+    mesh.materials = {plain(1, 0, 0), plain(0, 1, 0)};
+    if (square) add_square(mesh, 1);
+    for (uint32_t i = 0; i < points; ++i) {
+      mesh.points.push_back({static_cast<uint32_t>(mesh.positions.size()), i});
+      mesh.positions.push_back(i ? glm::dvec3(0.51, 0.51, 0.99) : glm::dvec3(0.5, 0.5, 1));
+    }
+    mesh.uvs.resize(mesh.positions.size());
+    return mesh;
+  };
+  const auto voxels = by_place(voxelise(mesh_of(true, 2), {8}));
+  EXPECT_EQ(voxels.size(), 65u);
+  expect_near(voxels.at(morton_code(4, 4, 7)), stored(0.5), stored(0.5), 0);
+  // Points alone; a single one.
+  EXPECT_EQ(voxelise(mesh_of(false, 2), {8}).size(), 2u);
+  EXPECT_EQ(voxelise(mesh_of(false, 1), {8}).size(), 1u);
+  EXPECT_EQ(info_.dims, Index3(1));
+  EXPECT_FALSE(make_surface(mesh_of(false, 0), {8}, ctx_));
 }
 
 TEST_F(VoxeliseColorTest, TextureCoordinatesOfAnySize) {

@@ -18,6 +18,7 @@ using Surface = Result<std::unique_ptr<color::SurfaceSource>>;
 Surface voxelise(const std::string& name, const SurfaceOptions& options, Context& ctx) {
   color::VoxeliseOptions voxelise;
   voxelise.kind = options.kind;
+  voxelise.emission = options.emission;
   if (options.resolution) voxelise.resolution = *options.resolution;
   if (has_ending(name, ".ply")) {
     VOX_TRY(auto points, open_ply_points(name));
@@ -28,12 +29,14 @@ Surface voxelise(const std::string& name, const SurfaceOptions& options, Context
 }
 
 Surface open_any(const std::string& name, const SurfaceOptions& options, Context& ctx) {
+  if (options.frame && !has_ending(name, ".vox"))
+    return fail(ErrorCode::usage, name, "--frame: is no animated model: expected a .vox file");
   if (is_mesh_name(name)) return voxelise(name, options, ctx);
   if (options.resolution)
     return fail(ErrorCode::usage, name, "--resolution: has voxels already: expected a mesh");
   if (color::is_terrain(name)) return color::open_terrain(name);
   if (has_ending(name, ".vox")) {
-    VOX_TRY(VoxelScene scene, read_magicavoxel(name, ctx));
+    VOX_TRY(VoxelScene scene, read_magicavoxel(name, ctx, options.frame.value_or(0)));
     return color::surface_of(std::move(scene), ctx);
   }
   VOX_TRY(Input input, open_input(name, options.open, ctx));

@@ -15,6 +15,8 @@ struct SurfaceOptions {
   OpenOptions open;
   std::optional<int64_t> resolution;  ///< of meshes: voxels along the longest side
   color::SurfaceKind kind = color::SurfaceKind::thin;
+  bool emission = true;           ///< of meshes: is added to the colours
+  std::optional<uint32_t> frame;  ///< of an animated .vox model
 };
 
 /// Opens a surface; it can be read once. ErrorCode::usage where the options do not go with it.

@@ -20,9 +20,25 @@ std::array<int32_t, 3> place_of(const color::SurfaceVoxel& voxel) {
   return {static_cast<int32_t>(at.x), static_cast<int32_t>(at.y), static_cast<int32_t>(at.z)};
 }
 
+/// Whether floats move the centres of voxels, somewhere in the volume, by more than they may.
+bool needs_doubles(const VolumeInfo& info) {
+  const auto spacing = info.affine.spacing();
+  const double step = std::min({spacing[0], spacing[1], spacing[2]});
+  for (size_t a = 0; a < 3; ++a) {
+    double least = info.affine.origin[a], most = least;
+    for (size_t i = 0; i < 3; ++i) {
+      const double along = info.affine.axes[i][a] * static_cast<double>(info.dims[static_cast<int>(i)] - 1);
+      (along < 0 ? least : most) += along;
+    }
+    if (voxkit::needs_doubles(least, most, step)) return true;
+  }
+  return false;
+}
+
 Status write_points(const color::Volume& volume, const std::string& name, bool force, Context& ctx) {
   const VolumeInfo& info = volume.info();
-  VOX_TRY(auto writer, PlyPointWriter::create(name, volume.params().leaf_voxels, force));
+  const bool doubles = needs_doubles(info);
+  VOX_TRY(auto writer, PlyPointWriter::create(name, volume.params().leaf_voxels, doubles, force));
   std::vector<ColoredPoint> points;
   VOX_CHECK(volume.for_each_voxel(
       [&](Voxels voxels) -> Status {
@@ -32,7 +48,7 @@ Status write_points(const color::Volume& volume, const std::string& name, bool f
           const Affine::Vector place = info.affine.place(
               {static_cast<double>(at[0]), static_cast<double>(at[1]), static_cast<double>(at[2])});
           ColoredPoint& point = points.emplace_back();
-          for (size_t a = 0; a < 3; ++a) point.at[a] = static_cast<float>(place[a]);
+          point.at = {place[0], place[1], place[2]};
           point.color = {voxel.color.r, voxel.color.g, voxel.color.b};
         }
         return writer.add(points);

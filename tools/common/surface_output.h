@@ -12,7 +12,8 @@ namespace voxkit::cli {
 bool is_surface_output(const std::string& name);
 bool is_only_surface_output(const std::string& name);
 
-/// Writes all voxels of a surface. As .ply: points where their centres are. As .vdb: the active voxels of a
+/// Writes all voxels of a surface. As .ply: points where their centres are, as
+/// doubles where floats cannot tell them apart. As .vdb: the active voxels of a
 /// Vec3s grid. As .vox: models; where there are more than 255 colours, each becomes the nearest of a palette.
 /// Memory: of .vdb, 6 KiB for each cube of 8 voxels a side that has any; of .vox, 11 bytes a voxel and 64
 /// MiB.
