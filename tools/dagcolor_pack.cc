@@ -110,7 +110,7 @@ int64_t resolution_of(const VolumeInfo& info) {
 }
 
 Json json_of(const Encoding& encoding, const Run& run, const color::Report& report, const Options& o,
-             const std::optional<color::SurfaceDiff>& diff) {
+             const std::vector<std::string>& notes, const std::optional<color::SurfaceDiff>& diff) {
   const color::Params& p = report.params;
   Json json = encoding_json(encoding, run, params_json(p));
   json.set("resolution", resolution_of(encoding.info));
@@ -120,10 +120,21 @@ Json json_of(const Encoding& encoding, const Run& run, const color::Report& repo
                                        static_cast<double>(std::max<uint64_t>(p.leaf_voxels, 1)));
   json.set("geometry_bytes", p.dag_bytes).set("grmse", p.grmse).set("max_distance", report.most_error);
   json.set("emissive", o.emissive);
+  Json list = Json::array();
+  for (const std::string& note : notes) list.push(std::string_view(note));
+  json.set("notes", std::move(list));
   json.set("build_seconds", report.build_seconds).set("color_seconds", report.color_seconds);
   if (diff)
     json.set("rmse", diff->rmse).set("psnr_db", diff->psnr_db).set("max_abs_error", diff->max_abs_error);
   return json;
+}
+
+/// Notes quote files: control characters become '?'.
+std::vector<std::string> printable(std::vector<std::string> notes) {
+  for (std::string& note : notes)
+    for (char& c : note)
+      if (static_cast<unsigned char>(c) < ' ' || c == '\x7f') c = '?';
+  return notes;
 }
 
 /// What is encoded, and what is already.
@@ -147,7 +158,7 @@ Result<int> work(const Options& o, Run& run) {
   run.stage("read");
   VOX_TRY(TiledSurface opened, open_what(o, options, run.ctx));
   const VolumeInfo info = opened.source->info();
-  const std::vector<std::string> notes = opened.source->notes();
+  const std::vector<std::string> notes = printable(opened.source->notes());
   const bool emits = opened.source->emits();
   VOX_TRY(auto out, OutputFile::create(o.output, run.options.force));
   run.stage("encode");
@@ -181,7 +192,7 @@ Result<int> work(const Options& o, Run& run) {
   VOX_CHECK(out->commit());
   if (!run.options.quiet)
     for (const std::string& note : notes) fmt::print(stderr, "{}: {}: {}\n", run.tool, o.input, note);
-  if (run.options.json) VOX_CHECK(print(json_of(encoding, run, report, o, diff).text()));
+  if (run.options.json) VOX_CHECK(print(json_of(encoding, run, report, o, notes, diff).text()));
   if (!run.options.quiet && !run.options.json)
     fmt::print(
         stderr,

@@ -92,6 +92,7 @@ class ObjReader {
         color[static_cast<int>(c)] = static_cast<float>(srgb_to_linear(static_cast<float>(values[3 + c])));
       }
       if (count == 7) color.a = static_cast<float>(values[6]);
+      faint_ |= color.a < 1;
     }
     return {};
   }
@@ -230,6 +231,7 @@ class ObjReader {
       *material_ = builder_.add_material(white);
       if (!name_.empty() && !library_.materials.empty()) unknown_.insert(name_);
     }
+    if (faint_) builder_.material(**material_).alpha_mode = AlphaMode::blend;
     return {};
   }
 
@@ -277,7 +279,7 @@ class ObjReader {
   CountedList<glm::vec4> colors_;  ///< of the first vertices; the others are white
   MaterialLibrary library_;
   std::set<std::string> read_, dropped_, unknown_;
-  bool too_bright_ = false;
+  bool too_bright_ = false, faint_ = false;  ///< that some color is
 
   std::string name_;
   const ObjMaterial* now_ = nullptr;

@@ -63,7 +63,11 @@ class PlyReader {
   /// Of red, green, blue or alpha as they are stored.
   void set_color(glm::vec4& color, const Property& p, double value) {
     const double stored = value * scale_of(p.type);
-    too_bright_ |= stored > 1;
+    if (p.role == Role::alpha) {
+      faint_ |= stored < 1;
+    } else {
+      too_bright_ |= stored > 1;
+    }
     color[static_cast<int>(p.role) - static_cast<int>(Role::red)] =
         static_cast<float>(p.role == Role::alpha ? stored : srgb_to_linear(stored));
   }
@@ -192,7 +196,9 @@ class PlyReader {
     for (size_t i = 0; i < std::max<size_t>(header_.textures.size(), 1); ++i) {
       MeshParts::Maps maps;
       if (uvs && i < header_.textures.size()) maps.color.name = header_.textures[i];
-      builder_.add_material({}, std::move(maps));
+      MeshMaterial material;
+      if (faint_) material.alpha_mode = AlphaMode::blend;
+      builder_.add_material(material, std::move(maps));
     }
     if (!uvs && !header_.textures.empty())
       builder_.note(
@@ -204,7 +210,7 @@ class PlyReader {
   const std::string& path_;
   MeshBuilder builder_;
   uint64_t vertices_ = 0;  ///< of the file
-  bool vertex_colors_ = false, too_bright_ = false, lost_colors_ = false;
+  bool vertex_colors_ = false, too_bright_ = false, faint_ = false, lost_colors_ = false;
   std::vector<uint32_t> numbers32_;
 };
 

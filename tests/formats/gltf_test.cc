@@ -295,10 +295,7 @@ TEST_F(GltfTest, ScenesAndVersions) {
 TEST_F(GltfTest, Meshopt) {
   if (!load_module(module_folder(), {"meshopt", "", ""})) GTEST_SKIP() << "no meshoptimizer";
   // By meshoptimizer 0.18.
-  const std::string attributes =
-      "a000000133000000ffff01330000007e7d0000010c000000ff010c0000007e0000000000000000000000000000000000000000"
-      "00000000000000"
-      "000000000000000000";
+  const std::string attributes = meshopt_places;
   const std::string exponential =
       "a0000133000000403f00012000000000010c000000400001200000000000000120000000000000000000000000000000000000"
       "0000000000000000"
@@ -338,16 +335,7 @@ TEST_F(GltfTest, Meshopt) {
 
 TEST_F(GltfTest, Draco) {
   if (!load_module(module_folder(), {"draco", "", ""})) GTEST_SKIP() << "no libdraco";
-  // By libdraco 1.5.5: sequential, and edgebreaker.
-  for (const std::string hex :
-       {"445241434f020201000000020401000102000203010200090300000202030001020101010100030301300110030034828804"
-        "000000"
-        "00ff000000000101000303012001200300f08331b00100000000ff0000000000000000000000000000000000803f08",
-        "445241434f02020101000000040201020000011fff0111ff011102ff00000000000100090300000201020203000101010101"
-        "0003030130"
-        "011003002882980000000000ff0000000000000000000000000000000000803f080101010003030130011003002482912600"
-        "000000ff00"
-        "0000"}) {
+  for (const char* const hex : {draco_sequential, draco_edgebreaker}) {
     GltfFile file;
     const int view = file.view(unhex(hex));
     const auto square = [&](int points, int corners) {

@@ -12,6 +12,7 @@
 #include "formats/mesh/mesh.h"
 #include "formats/module.h"
 #include "tests/formats/file_format_test.h"
+#include "tests/formats/gltf_file.h"
 #include "tests/formats/mesh_files.h"
 
 namespace voxkit {
@@ -88,63 +89,5 @@ class MeshReadingTest : public FileFormatTest {
     return sum;
   }
 };
-
-/// A glTF file, put together part by part.
-class GltfFile {
- public:
-  /// The number of a view of these bytes.
-  int view(const std::string& bytes, const std::string& more = "") {
-    buffer_.resize((buffer_.size() + 3) / 4 * 4);
-    views_.push_back(fmt::format(R"({{"buffer":0,"byteOffset":{},"byteLength":{}{}}})", buffer_.size(),
-                                 bytes.size(), more));
-    buffer_ += bytes;
-    return static_cast<int>(views_.size() - 1);
-  }
-  int accessor(const std::string& bytes, int component, int count, const std::string& type,
-               const std::string& more = "", const std::string& of_view = "") {
-    return raw_accessor(fmt::format(R"("bufferView":{},"componentType":{},"count":{},"type":"{}"{})",
-                                    view(bytes, of_view), component, count, type, more));
-  }
-  int raw_accessor(const std::string& members) {
-    accessors_.push_back("{" + members + "}");
-    return static_cast<int>(accessors_.size() - 1);
-  }
-  template <class T>
-  int numbers(const std::vector<T>& values, int component, const std::string& type,
-              const std::string& more = "") {
-    const size_t each = type == "SCALAR" ? 1
-                        : type == "VEC2" ? 2
-                        : type == "VEC3" ? 3
-                        : type == "VEC4" ? 4
-                                         : 16;
-    return accessor(bytes_of(values), component, static_cast<int>(values.size() / each), type, more);
-  }
-  int square() { return numbers<float>({0, 0, 0, 1, 0, 0, 1, 1, 0, 0, 1, 0}, 5126, "VEC3"); }
-  int square_corners() { return numbers<uint16_t>({0, 1, 2, 0, 2, 3}, 5123, "SCALAR"); }
-
-  std::string nodes = R"([{"mesh":0}])", scenes = R"([{"nodes":[0]}])", primitives, meshes, materials, rest;
-
-  std::string json() const {
-    const std::string all_meshes =
-        meshes.empty() ? fmt::format(R"([{{"primitives":[{}]}}])", primitives) : meshes;
-    return fmt::format(
-        R"({{"asset":{{"version":"2.0"}},"scenes":{},"nodes":{},"meshes":{},"materials":[{}],"bufferViews":[{}],)"
-        R"("accessors":[{}]{},"buffers":[{{"byteLength":{},"uri":"data:application/octet-stream;base64,{}"}}]}})",
-        scenes, nodes, all_meshes, materials, fmt::join(views_, ","), fmt::join(accessors_, ","), rest,
-        buffer_.size(), base64(buffer_));
-  }
-
- private:
-  std::string buffer_;
-  std::vector<std::string> views_, accessors_;
-};
-
-/// Bytes from digits of base 16.
-inline std::string unhex(const std::string& digits) {
-  std::string bytes;
-  for (size_t i = 0; i + 1 < digits.size(); i += 2)
-    bytes += static_cast<char>(std::stoi(digits.substr(i, 2), nullptr, 16));
-  return bytes;
-}
 
 }  // namespace voxkit

@@ -48,6 +48,7 @@ TEST_F(MeshPlyTest, EveryTypeInEitherOrder) {
     ASSERT_EQ(mesh.positions.size(), 3u);
     EXPECT_EQ(mesh.positions[2], glm::dvec3(3, -1200, 70002));
     EXPECT_EQ(mesh.colors[1], glm::vec4(0, 1, 1, 0.25f));
+    EXPECT_EQ(mesh.materials[0].alpha_mode, AlphaMode::blend);
     ASSERT_EQ(mesh.triangles.size(), 1u);
     EXPECT_EQ(mesh.triangles[0].vertices, (std::array<uint32_t, 3>{2, 0, 1}));
   }

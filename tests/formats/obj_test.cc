@@ -66,6 +66,7 @@ TEST_F(ObjTest, ColoursOfVertices) {
   EXPECT_NEAR(mesh.colors[1].g, 0.21404, 1e-4);
   EXPECT_EQ(mesh.colors[2], glm::vec4(1));  // a weight
   EXPECT_EQ(mesh.colors[3].a, 0.25f);
+  EXPECT_EQ(material_of(mesh).alpha_mode, AlphaMode::blend);
   EXPECT_TRUE(has_note(read("v 0 0 0 255 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 3\n"), "above 1"));
 }
 

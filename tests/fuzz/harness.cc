@@ -267,13 +267,14 @@ Verdict read_mesh_ply(Input input) {
   const auto points = open_ply_points(path);
   if (!points) return judge(points.error());
   if (!*points) return read_mesh_file(path);
-  uint64_t found = 0;
+  uint64_t found = 0, come = 0;
   const Status status = (*points)->read([&](std::span<const CloudPoint> run) -> Status {
+    come += run.size();
     for (const CloudPoint& point : run) found += std::isfinite(point.at.x + point.at.y + point.at.z);
     return {};
   });
   if (!status) return judge(status.error());
-  return found == (*points)->size() ? Verdict{true, {}} : fault("points that are not there");
+  return found == come && come <= (*points)->size() ? Verdict{true, {}} : fault("points that are not there");
 }
 
 Verdict read_mesh_gltf(Input input) {

@@ -1,4 +1,5 @@
 // Small meshes.
+#include "tests/formats/gltf_file.h"
 #include "tests/formats/mesh_files.h"
 #include "tests/fuzz/seeds.h"
 
@@ -25,23 +26,79 @@ GltfSquare rich_square() {
   return file;
 }
 
+/// With a skin, morph weights, instances, quantised places, points, strips and packed parts.
+std::string bent_square() {
+  GltfFile file;
+  const int position =
+      file.numbers<int16_t>({0, 0, 0, 9, 0, 0, 9, 9, 0, 0, 9, 0}, 5122, "VEC3", R"(,"normalized":true)");
+  const int joints = file.numbers<uint8_t>({0, 1, 0, 0, 0, 1, 0, 0, 1, 0, 0, 0, 1, 0, 0, 0}, 5121, "VEC4");
+  const int weights =
+      file.numbers<float>({1, 0, 0, 0, 1, 0, 0, 0, 1, 0, 0, 0, 0.5f, 0.5f, 0, 0}, 5126, "VEC4");
+  const int shift = file.numbers<float>({0, 0, 0, 3, 0, 0}, 5126, "VEC3");
+  const int target = file.numbers<float>({0, 0, 0, 0, 0, 0, 0, 2, 0, 0, 2, 0}, 5126, "VEC3");
+  file.primitives = fmt::format(
+      R"({{"attributes":{{"POSITION":{0},"JOINTS_0":{1},"WEIGHTS_0":{2}}},"indices":{3},"targets":[{{"POSITION":{4}}}]}},)"
+      R"({{"attributes":{{"POSITION":{0}}},"mode":0}},{{"attributes":{{"POSITION":{0}}},"mode":5}})",
+      position, joints, weights, file.square_corners(), target);
+  file.nodes = fmt::format(
+      R"([{{"mesh":0,"skin":0,"weights":[0.5]}},{{"children":[2]}},{{"translation":[0,3,0]}},)"
+      R"({{"mesh":0,"extensions":{{"EXT_mesh_gpu_instancing":{{"attributes":{{"TRANSLATION":{}}}}}}}}}])",
+      shift);
+  file.scenes = R"([{"nodes":[0,1,3]}])";
+  file.rest = R"(,"skins":[{"joints":[1,2]}])";
+  return file.json();
+}
+std::string packed_square() {
+  GltfFile file;
+  const std::string packed = unhex(meshopt_places);
+  file.view(packed);
+  const int position = file.accessor(
+      std::string(48, '\0'), 5126, 4, "VEC3", "",
+      fmt::format(
+          R"(,"extensions":{{"EXT_meshopt_compression":{{"buffer":0,"byteLength":{},"byteStride":12,"count":4,"mode":"ATTRIBUTES"}}}})",
+          packed.size()));
+  file.primitives =
+      fmt::format(R"({{"attributes":{{"POSITION":{}}},"indices":{}}})", position, file.square_corners());
+  return file.json();
+}
+std::string draco_square(const char* hex) {
+  GltfFile file;
+  const int view = file.view(unhex(hex));
+  file.primitives = fmt::format(
+      R"({{"attributes":{{"POSITION":{}}},"indices":{},"extensions":{{"KHR_draco_mesh_compression":{{"bufferView":{},"attributes":{{"POSITION":0}}}}}}}})",
+      file.raw_accessor(R"("componentType":5126,"count":4,"type":"VEC3")"),
+      file.raw_accessor(R"("componentType":5123,"count":6,"type":"SCALAR")"), view);
+  return file.json();
+}
+
 }  // namespace
 
 std::vector<std::string> mesh_ply_seeds() {
-  return {ply_triangle(false), ply_triangle(true),
-          "ply\nformat ascii 1.0\ncomment by hand\nelement vertex 4\nproperty float x\nproperty float y\n"
-          "property float z\nelement face 1\nproperty list uchar int vertex_indices\n"
-          "property list uchar float texcoord\nend_header\n"
-          "0 0 0\n1 0 0\n1 1 0\n0 1 0\n4 0 1 2 3 8 0 0 1 0 1 1 0 1\n"};
+  return {
+      ply_triangle(false), ply_triangle(true),
+      "ply\nformat ascii 1.0\ncomment by hand\nelement vertex 4\nproperty float x\nproperty float y\n"
+      "property float z\nelement face 1\nproperty list uchar int vertex_indices\n"
+      "property list uchar float texcoord\nend_header\n"
+      "0 0 0\n1 0 0\n1 1 0\n0 1 0\n4 0 1 2 3 8 0 0 1 0 1 1 0 1\n",
+      "ply\nformat ascii 1.0\nelement face 1\nproperty list uchar int vertex_indices\nproperty uchar red\n"
+      "element vertex 4\nproperty double x\nproperty float y\nproperty float z\nproperty uchar a\n"
+      "element tristrips 1\nproperty list int int vertex_indices\nend_header\n"
+      "4 0 1 2 3 9\n0 0 0 1\n3 0 0 1\n1 1 0 1\n0 3 0 1\n6 0 1 2 -1 2 3\n"};
 }
 
 std::vector<std::string> mesh_gltf_seeds() {
-  return {GltfSquare{}.glb(), rich_square().glb(), rich_square().gltf()};
+  return {GltfSquare{}.glb(),
+          rich_square().glb(),
+          rich_square().gltf(),
+          bent_square(),
+          packed_square(),
+          draco_square(draco_sequential),
+          draco_square(draco_edgebreaker)};
 }
 
 std::vector<std::string> mesh_obj_seeds() {
-  return {obj_square(),
-          obj_square("o a\ng b\ns 1\nvn 0 0 1\n") + "usemtl x\nf 1//1 -2//1 3//1\nl 1 2\np 1\n"};
+  return {obj_square(), obj_square("o a\ng b\ns 1\nvn 0 0 1\n") + "usemtl x\nf 1//1 -2//1 3//1\nl 1 2\np 1\n",
+          "f 1 2 \\\n3 4 5\nv .5 0 0 1 0 .5\nv 2 1. 0\nv 0 2e0 0\nv 1 1 0 .25\nv +1 -0.5 0\n"};
 }
 
 }  // namespace voxkit::fuzz
