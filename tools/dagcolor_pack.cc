@@ -190,8 +190,7 @@ Result<int> work(const Options& o, Run& run) {
     }
   }
   VOX_CHECK(out->commit());
-  if (!run.options.quiet)
-    for (const std::string& note : notes) fmt::print(stderr, "{}: {}: {}\n", run.tool, o.input, note);
+  for (const std::string& note : notes) run.say(fmt::format("{}: {}", o.input, note));
   if (run.options.json) VOX_CHECK(print(json_of(encoding, run, report, o, notes, diff).text()));
   if (!run.options.quiet && !run.options.json)
     fmt::print(

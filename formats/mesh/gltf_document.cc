@@ -466,7 +466,9 @@ Result<Document> read_document(std::string_view text, std::optional<uint64_t> ow
   try {
     json = Json::parse(text.begin(), text.end(), nullptr, /*allow_exceptions=*/false);
     if (json.is_discarded()) return bad_input(path, "corrupt glTF file: its text is not JSON");
-    return Reader(json, own_bytes, path, ctx).read();
+    VOX_TRY(Document document, Reader(json, own_bytes, path, ctx).read());
+    VOX_TRY(document.memory, Reservation::take(text.size(), "the text of the mesh", ctx));
+    return document;
   } catch (const std::bad_alloc&) {
     return fail(ErrorCode::limit, path, "not enough memory to read the mesh");
   } catch (const std::exception& error) {

@@ -143,6 +143,7 @@ struct Document {
   std::vector<Skin> skins;
   std::vector<uint32_t> roots;     ///< of the scene
   std::vector<std::string> notes;  ///< what of the file is left out
+  Reservation memory;              ///< of its texts
 };
 
 /// Reads the text. `own_bytes`: how many bytes of buffers are in the file itself. Errors: ErrorCode::input

@@ -147,8 +147,8 @@ class ObjReader {
   Status read_elements() {
     TextStatements lines(bytes_);
     uint32_t vertices = 0, uvs = 0;  // up to here: negative numbers count back
-    std::vector<uint32_t> corners;
-    std::vector<Corner> read;
+    CountedList<uint32_t> corners;
+    CountedList<Corner> read;
     while (lines.next()) {
       const std::string_view keyword = lines.word();
       if (keyword == "v") {
@@ -156,24 +156,26 @@ class ObjReader {
       } else if (keyword == "vt") {
         ++uvs;
       } else if (keyword == "f" || keyword == "fo" || keyword == "p") {
-        read.clear();
+        read.values.clear();
         bool has_uvs = true;
         for (std::string_view word; !(word = lines.word()).empty();) {
           VOX_TRY(const Corner corner, read_corner(lines, word, vertices, uvs));
           has_uvs &= corner.uv != none;
-          read.push_back(corner);
+          VOX_CHECK(read.make_room(1, "a polygon", ctx_));
+          read.values.push_back(corner);
         }
         if (!material_) VOX_CHECK(use_material(""));
         const uint32_t material = has_uvs ? **material_ : builder_.without_textures(**material_);
-        corners.clear();
-        for (const Corner& corner : read) {
+        corners.values.clear();
+        VOX_CHECK(corners.make_room(read.values.size(), "a polygon", ctx_));
+        for (const Corner& corner : read.values) {
           VOX_TRY(const uint32_t vertex, vertex_of(corner));
-          corners.push_back(vertex);
+          corners.values.push_back(vertex);
         }
         if (keyword == "p") {
-          for (const uint32_t corner : corners) VOX_CHECK(builder_.add_point(corner, material));
+          for (const uint32_t corner : corners.values) VOX_CHECK(builder_.add_point(corner, material));
         } else {
-          VOX_CHECK(builder_.add_polygon(corners, material));
+          VOX_CHECK(builder_.add_polygon(corners.values, material));
         }
       } else if (keyword == "usemtl") {
         VOX_CHECK(use_material(lines.rest()));

@@ -20,7 +20,7 @@ using namespace ply;
 class PlyReader {
  public:
   PlyReader(const Header& header, std::span<const std::byte> bytes, const std::string& path, Context& ctx)
-      : header_(header), numbers_(bytes, header, path), path_(path), builder_(path, ctx) {}
+      : header_(header), numbers_(bytes, header, path), path_(path), ctx_(ctx), builder_(path, ctx) {}
 
   Result<MeshParts> read() {
     // Faces that come before their vertices wait for these.
@@ -106,8 +106,10 @@ class PlyReader {
     const bool strips = element.name == "tristrips", colors = element.has(Role::red) && !vertex_colors_;
     lost_colors_ |= element.has(Role::red) && vertex_colors_ && element.count > 0;
     if (colors) VOX_CHECK(builder_.add_attributes({.colors = true}));
-    std::vector<int64_t> corners;
-    std::vector<glm::vec2> texcoords;
+    CountedList<int64_t> corner_list;
+    CountedList<glm::vec2> texcoord_list;
+    auto& corners = corner_list.values;
+    auto& texcoords = texcoord_list.values;
     for (uint64_t i = 0; i < element.count; ++i) {
       corners.clear();
       texcoords.clear();
@@ -127,6 +129,9 @@ class PlyReader {
           continue;
         }
         VOX_TRY(const uint64_t count, numbers.list_size(p));
+        // Twice: for the numbers that they become.
+        VOX_CHECK(corner_list.make_room(p.role == Role::corners ? 2 * count : 0, "a polygon", ctx_));
+        VOX_CHECK(texcoord_list.make_room(p.role == Role::texcoords ? count / 2 + 1 : 0, "a polygon", ctx_));
         for (uint64_t j = 0; j < count; ++j) {
           VOX_TRY(const double value, numbers.next(p.type));
           if (p.role == Role::corners) {
@@ -208,6 +213,7 @@ class PlyReader {
   const Header& header_;
   Numbers numbers_;
   const std::string& path_;
+  Context& ctx_;
   MeshBuilder builder_;
   uint64_t vertices_ = 0;  ///< of the file
   bool vertex_colors_ = false, too_bright_ = false, faint_ = false, lost_colors_ = false;
