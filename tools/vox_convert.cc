@@ -52,7 +52,9 @@ void declare(CommandLine& line, Options& o) {
 
 /// The input with everything done to it but its type.
 Result<std::unique_ptr<VolumeSource>> open(const Options& o, Context& ctx) {
-  VOX_TRY(Input input, open_input(o.input, o.open, ctx));
+  OpenOptions how = o.open;
+  how.real_values = o.apply_scale;
+  VOX_TRY(Input input, open_input(o.input, how, ctx));
   auto source = std::move(input.source);
   if (!o.orient.empty()) {
     VOX_TRY(const AxisOrder order, order_for(o.orient, source->info()));

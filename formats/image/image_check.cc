@@ -75,6 +75,11 @@ uint32_t load_be(const std::byte* p) {
 
 }  // namespace
 
+Status check_image_pixels(const std::string& path, int64_t width, int64_t height) {
+  if (width < 1 || height < 1 || width <= max_image_pixels / height) return {};
+  return bad_input(path, fmt::format("image of {} x {} pixels: expected at most 2^31", width, height));
+}
+
 Status check_png(const std::string& path) {
   VOX_TRY(const auto file, MappedFile::open(path));
   const auto bytes = file->bytes();

@@ -8,6 +8,11 @@
 
 namespace voxkit {
 
+/// Images of more pixels are refused, whatever the memory: a few bytes may stand for them.
+inline constexpr int64_t max_image_pixels = int64_t{1} << 31;
+/// ErrorCode::input where an image of that size has more.
+Status check_image_pixels(const std::string& path, int64_t width, int64_t height);
+
 /// Follows the chunks of a PNG file and checks their checksums. libpng finds the same damage, but writes to
 /// standard error.
 Status check_png(const std::string& path);

@@ -13,13 +13,13 @@
 #include <vector>
 
 #include "formats/image/image_input.h"
-#include "formats/image/tiff_pages.h"
+#include "formats/image/image_output.h"
+#include "formats/image/tiff_file.h"
 #include "formats/output_file.h"
 
 namespace voxkit {
 namespace {
 
-using OIIO::ImageOutput;
 using OIIO::ImageSpec;
 using OIIO::TypeDesc;
 
@@ -161,12 +161,6 @@ void interleave(const Image& image, std::span<const ImageLayer> layers, int64_t 
 
 Status write(const std::string& path, const Image& image, std::span<const ImageLayer> layers,
              const std::string& format, OutputFile& file) {
-  const auto failed = [&](const std::string& why) {
-    return fail(ErrorCode::output, path, "cannot write: " + one_line(why));
-  };
-  auto output = ImageOutput::create(format);
-  if (!output) return failed("OpenImageIO was built without " + format);
-  output->threads(1);
   const TypeDesc type = file_type(image.type());
   ImageSpec spec(static_cast<int>(image.width()), static_cast<int>(image.height()), image.channels(), type);
   if (image.channels() == 2) {
@@ -181,7 +175,8 @@ Status write(const std::string& path, const Image& image, std::span<const ImageL
   spec.attribute("compression", "zip");
   spec.attribute("oiio:UnassociatedAlpha", 1);
   spec.attribute("DateTime", "");  // else the library writes the time of day
-  if (!output->open(file.temporary(), spec)) return failed(output->geterror());
+  CheckedImageOutput output(path, file.temporary());
+  VOX_CHECK(output.open(format, spec));
   const int64_t row_samples = image.width() * spec.nchannels;
   constexpr int64_t rows_at_once = 64;
   std::vector<std::byte> rows(
@@ -194,11 +189,9 @@ Status write(const std::string& path, const Image& image, std::span<const ImageL
       for (int64_t i = y; i < end; ++i)
         interleave(image, layers, i, spec.nchannels,
                    reinterpret_cast<float*>(rows.data()) + (i - y) * row_samples);
-    if (!output->write_scanlines(static_cast<int>(y), static_cast<int>(end), 0, type, rows.data()))
-      return failed(output->geterror());
+    VOX_CHECK(output.write(y, end, type, rows.data()));
   }
-  if (!output->close()) return failed(output->geterror());
-  return {};
+  return output.close();
 }
 
 }  // namespace

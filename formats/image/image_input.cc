@@ -79,6 +79,7 @@ Result<std::unique_ptr<ImageInput>> open_image(const std::string& path, uint64_t
   if (spec.image_bytes() / 65536 > static_cast<uint64_t>(state.st_size) + 16)
     return bad_input(path, fmt::format("header says {}: a file of {} bytes cannot hold that", describe(spec),
                                        static_cast<int64_t>(state.st_size)));
+  VOX_CHECK(check_image_pixels(path, spec.width, spec.height));
   if (bytes > memory_limit / 2)
     return fail(
         ErrorCode::limit, path,

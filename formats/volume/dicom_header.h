@@ -1,44 +1,63 @@
-// The header of a DICOM slice, and where its pixels lie: PS3.5 sections 7, 8 and A.4, PS3.10 section 7.
-//
-// Read here and not by GDCM, whose parser aborts the process on some damaged files.
+// What the header of a DICOM file says about its frames, and where their pixels lie: PS3.3 sections C.7.6,
+// C.8.8.3 and C.8.4.9.
 #pragma once
 
+#include <array>
 #include <cstdint>
+#include <memory>
 #include <optional>
 #include <string>
 #include <vector>
 
 #include "formats/result.h"
+#include "formats/volume/dicom_data.h"
 
 namespace voxkit {
 
-/// A run of bytes in a file.
-struct FilePart {
-  int64_t offset = 0, bytes = 0;
-};
-
-/// What a slice's header says; vectors are empty where it does not say.
-struct DicomHeader {
-  std::string path, series, photometric, transfer_syntax;
-  int64_t columns = 0, rows = 0, samples = 1;
-  double frames = 1;
-  int bits_allocated = 0, bits_stored = 0, high_bit = 0;
-  bool is_signed = false;
-  double slope = 1, intercept = 0;
-  std::optional<int64_t> instance;
+/// One slice; vectors are empty where nothing is said.
+struct DicomFrame {
   std::vector<double> position;       ///< 3, in mm
   std::vector<double> orientation;    ///< 6: directions of a row and of a column
   std::vector<double> pixel_spacing;  ///< 2: distance of rows, distance of columns, in mm
-  double thickness = 1;               ///< distance of slices, else their thickness, in mm
-  bool big_endian = false;
-  bool encapsulated = false;     ///< compressed: `pixels` are fragments of a code stream
-  std::vector<FilePart> pixels;  ///< all inside the file; one where not encapsulated
+  double thickness = 0;               ///< distance of slices, else their thickness, in mm; 0: not said
+  double slope = 1, intercept = 0;
+  double time = 0;  ///< number of its time step
+  /// Where its pixels begin in DicomHeader::pixels: bytes of the one part there (bits of pixels of one bit),
+  /// or the first fragment, and how many.
+  int64_t first = 0, fragments = 1;
+};
 
-  int64_t slice_bytes() const { return columns * rows * (bits_allocated / 8); }
+/// Colours of indices, 16 bits each.
+struct DicomPalette {
+  int first = 0;  ///< the index of the first entry
+  std::vector<std::array<uint16_t, 3>> colours;
+};
+
+/// What a file says of all its frames.
+struct DicomHeader {
+  std::string path, series, description, photometric, transfer_syntax, instance_id;
+  int64_t columns = 0, rows = 0, samples = 1;
+  bool planar = false;  ///< a picture of each colour after the other
+  int bits_allocated = 0, bits_stored = 0, high_bit = 0;
+  bool is_signed = false, is_float = false;
+  std::optional<int64_t> padding;  ///< the sample that stands for nothing measured
+  bool padding_range = false;      ///< others do, too
+  std::optional<int64_t> instance;
+  std::shared_ptr<const DicomPalette> palette;
+  bool big_endian = false;
+  bool encapsulated = false;     ///< compressed: `pixels` are fragments of code streams
+  std::vector<FilePart> pixels;  ///< all inside the file; one where not encapsulated
+  std::vector<DicomFrame> frames;
+  bool frames_are_times = false;  ///< a film: no places of slices
+  bool has_table = false;         ///< values have a meaning that is no straight line
+  bool has_time = false;          ///< the file numbers its time step
+
+  /// Of one frame, uncompressed; of pixels of one bit rounded up to bytes.
+  int64_t slice_bytes() const { return (columns * rows * samples * bits_allocated + 7) / 8; }
 };
 
 /// Reads the header of a file that starts as DICOM files do. Nothing where the file is none, or holds no
-/// image (a DICOMDIR, a report). Every length is checked against the file.
+/// image (a DICOMDIR, a report). Every length is checked against the file. Errors: ErrorCode::input.
 Result<std::optional<DicomHeader>> read_dicom_header(const std::string& path);
 
 }  // namespace voxkit

@@ -37,27 +37,33 @@ Kind kind_of(const std::string& name) {
   return Kind::none;
 }
 
-/// Whether a folder holds DICOM slices: its first files by name tell, more than one so that a note among them
-/// does no harm.
+/// Whether a file starts as DICOM files do, whatever its name.
+bool is_dicom(const fs::path& path) {
+  std::error_code unreadable;
+  if (!fs::is_regular_file(path, unreadable)) return false;
+  std::ifstream file(path, std::ios::binary);
+  std::array<char, 132> head{};
+  return file.read(head.data(), head.size()) && std::string_view(head.data() + 128, 4) == "DICM";
+}
+
+/// Whether a folder holds DICOM files, or folders in it do: its first files by name tell, more than one so
+/// that a note among them does no harm.
 Result<bool> holds_dicom(const std::string& folder) {
-  constexpr size_t looked_at = 16;
+  constexpr size_t looked_at = 16, most_entries = 100000;
   std::error_code error;
   std::vector<std::string> first;
-  for (fs::directory_iterator it(folder, error), end; !error && it != end; it.increment(error)) {
+  size_t entries = 0;
+  for (fs::recursive_directory_iterator it(folder, error), end; !error && it != end && entries < most_entries;
+       it.increment(error), ++entries) {
     std::error_code unreadable;
-    const std::string name = it->path().filename().string();
-    if (name.front() == '.' || !it->is_regular_file(unreadable)) continue;
+    const std::string name = it->path().string();
+    if (it->path().filename().string().front() == '.' || !it->is_regular_file(unreadable)) continue;
     first.insert(std::upper_bound(first.begin(), first.end(), name), name);
     if (first.size() > looked_at) first.pop_back();
   }
   if (error) return bad_input(folder, error.message());
-  for (const std::string& name : first) {
-    if (has_ending(name, ".dcm")) return true;
-    std::ifstream file(fs::path(folder) / name, std::ios::binary);
-    std::array<char, 132> head{};
-    if (file.read(head.data(), head.size()) && std::string_view(head.data() + 128, 4) == "DICM") return true;
-  }
-  return false;
+  return std::any_of(first.begin(), first.end(),
+                     [](const std::string& name) { return has_ending(name, ".dcm") || is_dicom(name); });
 }
 
 auto unknown_output(const std::string& name) {
@@ -83,7 +89,10 @@ Result<std::unique_ptr<VolumeSource>> open_volume(const std::string& name, const
     VOX_TRY(const bool dicom, holds_dicom(name));
     return dicom ? open_dicom(name, options, ctx) : open_image_stack(name, options, ctx);
   }
-  switch (kind_of(name)) {
+  const Kind kind = kind_of(name);
+  if (has_ending(name, ".dcm") || (kind != Kind::raw && is_dicom(name)))
+    return open_dicom(name, options, ctx);
+  switch (kind) {
     case Kind::nrrd:
       return open_nrrd(name, options, ctx);
     case Kind::nifti:
@@ -103,7 +112,8 @@ Result<std::unique_ptr<VolumeSource>> open_volume(const std::string& name, const
       name,
       "unknown kind of volume: expected one of .nrrd .nhdr .nii .nii.gz .vdb .raw .mrc .map .ccp4 .rec, "
       "images "
-      "(.tif .png .exr, a folder or a pattern), a folder of DICOM slices, or a built-in such as menger:5");
+      "(.tif .png .exr, a folder or a pattern), a DICOM file or a folder of them, or a built-in such as "
+      "menger:5");
 }
 
 Result<std::unique_ptr<VolumeSink>> create_volume(const std::string& name, const VolumeInfo& info, bool force,

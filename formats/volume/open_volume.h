@@ -12,23 +12,26 @@ namespace voxkit {
 
 /// What a user says about an input that its name does not.
 struct OpenOptions {
-  std::optional<Index3> dims;       ///< .raw only, where it is required
-  std::optional<std::string> type;  ///< .raw only: u8 i8 u16 i16 u32 i32 f32 f64 rgb8 rgba8 bit
-  bool big_endian = false;          ///< .raw only
+  std::optional<Index3> dims = {};       ///< .raw only, where it is required
+  std::optional<std::string> type = {};  ///< .raw only: u8 i8 u16 i16 u32 i32 f32 f64 rgb8 rgba8 bit
+  bool big_endian = false;               ///< .raw only
   // Which part of a file that has several. Without a choice where there is more than one: ErrorCode::input,
   // naming the option and what there is, unless `any_part` lets the reader take the first; VolumeInfo::parts
   // says what there is.
-  std::string grid;                ///< of a .vdb file: its name
-  std::optional<int64_t> time;     ///< number of a time step, from 0
-  std::optional<int64_t> channel;  ///< number of a channel, from 0
-  std::string series;              ///< of a folder of DICOM files: the end of a series' UID, or its number
+  std::string grid = {};                ///< of a .vdb file: its name
+  std::optional<int64_t> time = {};     ///< number of a time step, from 0
+  std::optional<int64_t> channel = {};  ///< number of a channel, from 0
+  std::string series = {};  ///< of a folder of DICOM files: the end of a series' UID, or its number
   bool any_part = false;
   // How samples are understood.
-  bool labels = false;         ///< values are names of things (VolumeInfo::is_labels)
-  std::optional<double> fill;  ///< sample value that stands for nothing measured (VolumeInfo::fill)
-  bool round_wide = false;     ///< integers that no voxel format holds exactly are rounded to floats
+  bool labels = false;              ///< values are names of things (VolumeInfo::is_labels)
+  std::optional<double> fill = {};  ///< sample value that stands for nothing measured (VolumeInfo::fill)
+  bool round_wide = false;          ///< integers that no voxel format holds exactly are rounded to floats
   /// What becomes of slices that are missing or unevenly far apart.
   enum class Gaps { refuse, accept, fill } gaps = Gaps::refuse;
+  /// Slope and intercept will be applied: a reader applies those that differ within a volume, which else is
+  /// refused.
+  bool real_values = false;
   bool allow_outside = false;  ///< detached headers may name data files outside of their own folder
 };
 

@@ -15,11 +15,30 @@ namespace voxkit {
 
 /// A grid as the file announces it.
 struct GridEntry {
-  std::string name, type, parent;
+  std::string name, type, parent, transform;
   int64_t descriptor = 0, start = 0, end = 0;  ///< byte offsets
   bool is(const char* tree) const { return type == tree || type == std::string(tree) + "_HalfFloat"; }
   bool is_float() const { return is("Tree_float_5_4_3"); }
   bool is_vec3s() const { return is("Tree_vec3s_5_4_3"); }
+  bool is_bool() const { return is("Tree_bool_5_4_3"); }
+  /// Of one value in memory; 0 for types that are not read.
+  int value_bytes() const {
+    if (is_bool()) return 1;
+    if (is_float() || is("Tree_int32_5_4_3")) return 4;
+    if (is("Tree_double_5_4_3") || is("Tree_int64_5_4_3")) return 8;
+    return is_vec3s() || is("Tree_vec3i_5_4_3") ? 12 : 0;
+  }
+  /// Of one value in blocks where floats are stored as halfs.
+  int half_bytes() const {
+    return is_float() || is("Tree_double_5_4_3") ? 2 : is_vec3s() ? 6 : value_bytes();
+  }
+  /// Whether its transform is an affine map.
+  bool is_linear() const {
+    for (const char* known : {"AffineMap", "UnitaryMap", "ScaleMap", "UniformScaleMap", "TranslationMap",
+                              "ScaleTranslateMap", "UniformScaleTranslateMap"})
+      if (transform == known) return true;
+    return false;
+  }
 };
 
 /// OpenVDB trusts the lengths in a file. So they are walked through here first: a stream that throws at the
@@ -60,7 +79,7 @@ class Walker {
       stream_.seekg(entry.start);
       skip(4);  // compression
       metadata();
-      text();  // type of the transform
+      entry.transform = text();
       stream_.seekg(entry.end);
       entries.push_back(std::move(entry));
       if (!offsets) break;  // written to a stream: no way to the next grid but through this one

@@ -110,6 +110,7 @@ class Walker {
     VOX_TRY(const auto again, mask(leaf_entries));
     if (std::memcmp(file_.data() + again, file_.data() + active, leaf_entries / 8) != 0)
       return broken("mask of a leaf's buffer differs from that of the leaf");
+    if (coding_.bits) return skip(12 + leaf_entries / 8);
     return values(active, leaf_entries);
   }
 

@@ -16,6 +16,7 @@ struct VdbCoding {
   uint32_t flags = 0;
   int value_bytes = 4;   ///< in memory, and of background and tile values
   int stored_bytes = 4;  ///< in blocks of values: fewer where floats are stored as halves
+  bool bits = false;     ///< leaves hold bits: a mask, an origin, the values
 };
 
 struct VdbTree {

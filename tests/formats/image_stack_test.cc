@@ -250,9 +250,10 @@ TEST_F(ImageStack, PixelsKeepTheirValues) {
 
 TEST_F(ImageStack, OtherPixelsAreRefused) {
   put("two.tif", Tiff{.width = 1, .height = 1, .samples = 2, .pages = {"ab"}}.bytes());
-  expect_refused("two.tif", ErrorCode::input, "2 channels of uint8: expected 1 channel, or 3 or 4 of 8 bits");
+  expect_refused("two.tif", ErrorCode::input,
+                 "2 channels of u8: expected 1 channel, or 3 or 4 of 8 bits, or --channel N");
   put("deep.tif", Tiff{.width = 1, .height = 1, .samples = 3, .bits = 16, .pages = {"abcdef"}}.bytes());
-  expect_refused("deep.tif", ErrorCode::input, "3 channels of uint16");
+  expect_refused("deep.tif", ErrorCode::input, "3 channels of u16");
 }
 
 TEST_F(ImageStack, SlicesMustBeAlike) {
@@ -262,7 +263,7 @@ TEST_F(ImageStack, SlicesMustBeAlike) {
   put_tiff("a2.tif", 2, 1, "ef");  // seen only when slice 1 is read
   expect_refused("a%d.tif", ErrorCode::input, "a1.tif: slice is 1 x 2");
   put("a1.tif", Tiff{.width = 2, .height = 1, .bits = 16, .pages = {"abcd"}}.bytes());
-  expect_refused("a%d.tif", ErrorCode::input, "uint16: expected 2 x 1 with 1 channel of uint8");
+  expect_refused("a%d.tif", ErrorCode::input, "u16: expected 2 x 1 with 1 channel of u8");
 }
 
 TEST_F(ImageStack, BoxesFromManyThreadsAreThoseOfTheWhole) {

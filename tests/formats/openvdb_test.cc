@@ -3,7 +3,9 @@
 #include <algorithm>
 #include <array>
 #include <filesystem>
+#include <string>
 #include <thread>
+#include <vector>
 
 #include "formats/module.h"
 #include "tests/formats/file_format_test.h"
@@ -264,7 +266,14 @@ TEST_F(OpenVdb, GridsAreFoundByName) {
   ASSERT_TRUE(write_vdb("color.vdb", colour, random_voxels(colour)));
   put("both.vdb", joined(get(path("density.vdb")), get(path("color.vdb"))));
   Bytes first, named, alone;
-  ASSERT_TRUE(read_vdb("both.vdb", first));
+  const auto unnamed = open_vdb(path("both.vdb"), {}, ctx_);
+  ASSERT_FALSE(unnamed);
+  EXPECT_EQ(unnamed.error().what,
+            "2 grids: expected --grid NAME with one of density (Tree_float_5_4_3), color (Tree_vec3s_5_4_3)");
+  const auto any = open_vdb(path("both.vdb"), {.any_part = true}, ctx_);
+  ASSERT_TRUE(any);
+  EXPECT_EQ((*any)->info().parts.size(), 1u);
+  ASSERT_TRUE(read_vdb("both.vdb", first, "density"));
   ASSERT_TRUE(read_vdb("density.vdb", alone));
   EXPECT_EQ(first, alone);
   ASSERT_TRUE(read_vdb("both.vdb", named, "color"));
@@ -279,14 +288,178 @@ TEST_F(OpenVdb, GridsAreFoundByName) {
       << missing.error().what;
 
   // The first grid is of a type that is not read: the second is taken, or the first refused by name.
-  put("int.vdb", replaced(get(path("both.vdb")), "Tree_float_5_4_3", "Tree_int32_5_4_3"));
+  put("int.vdb", replaced(get(path("both.vdb")), "Tree_float_5_4_3", "Tree_strng_5_4_3"));
   ASSERT_TRUE(read_vdb("int.vdb", named));
   EXPECT_EQ(named, alone);
   const auto refused = open_vdb(path("int.vdb"), grid_named("density"), ctx_);
   ASSERT_FALSE(refused);
-  EXPECT_NE(refused.error().what.find("unsupported grid type Tree_int32_5_4_3"), std::string::npos);
-  put("only.vdb", replaced(get(path("density.vdb")), "Tree_float_5_4_3", "Tree_int32_5_4_3"));
+  EXPECT_NE(refused.error().what.find("unsupported grid type Tree_strng_5_4_3"), std::string::npos);
+  put("only.vdb", replaced(get(path("density.vdb")), "Tree_float_5_4_3", "Tree_strng_5_4_3"));
   expect_error(path("only.vdb"), "unsupported grid type");
+}
+
+/// A file by hand, not compressed: one leaf at the origin, all of whose voxels are active.
+std::string by_hand(const std::string& type, const std::string& background, const std::string& values,
+                    const std::string& map = "AffineMap", const std::vector<double>& matrix = {}) {
+  std::string file;
+  const auto put = [&](auto value) { file.append(reinterpret_cast<const char*>(&value), sizeof value); };
+  const auto text = [&](const std::string& word) { put(static_cast<uint32_t>(word.size())), file += word; };
+  put(int64_t{0x56444220}), put(uint32_t{224}), put(uint32_t{10}), put(uint32_t{0}), put(char{1});
+  file += std::string(36, '0');
+  put(uint32_t{0}), put(int32_t{1});
+  text("g"), text("Tree_" + type + "_5_4_3"), text("");
+  const size_t offsets = file.size();
+  put(int64_t{0}), put(int64_t{0}), put(int64_t{0});
+  const auto start = static_cast<int64_t>(file.size());
+  put(uint32_t{0}), put(uint32_t{0}), text(map);  // no compression, no metadata
+  for (int i = 0; i < 16; ++i)
+    put(matrix.empty() ? (i % 5 == 0 ? 1.0 : 0.0) : matrix[static_cast<size_t>(i)]);
+  put(int32_t{1});  // buffers
+  file += background;
+  put(uint32_t{0}), put(uint32_t{1}), put(int32_t{0}), put(int32_t{0}), put(int32_t{0});
+  for (const size_t entries : {size_t{32768}, size_t{4096}}) {  // the first child of each
+    file += '\1' + std::string(entries / 8 - 1, '\0') + std::string(entries / 8, '\0') + '\6';
+    for (size_t i = 0; i < entries; ++i) file += background;
+  }
+  file += std::string(64, '\xff');
+  file += std::string(64, '\xff') + (type == "bool" ? std::string(12, '\0') : std::string("\6", 1)) + values;
+  const auto end = static_cast<int64_t>(file.size());
+  file.replace(offsets, 8, reinterpret_cast<const char*>(&start), 8);
+  file.replace(offsets + 8, 8, reinterpret_cast<const char*>(&end), 8);
+  file.replace(offsets + 16, 8, reinterpret_cast<const char*>(&end), 8);
+  return file;
+}
+/// Values of a leaf, z fastest: `of(x, y, z)`.
+template <class Of>
+std::string leaf_values(const Of& of) {
+  std::string raw;
+  for (int x = 0; x < 8; ++x)
+    for (int y = 0; y < 8; ++y)
+      for (int z = 0; z < 8; ++z) {
+        const auto value = of(x, y, z);
+        raw.append(reinterpret_cast<const char*>(&value), sizeof value);
+      }
+  return raw;
+}
+
+TEST_F(OpenVdb, BitsAndIntegersAreKept) {
+  std::string bits(64, '\0');
+  bits[static_cast<size_t>(3 * 8 + 2)] = 1 << 5;  // x 3, y 2, z 5
+  put("a.vdb", by_hand("bool", std::string(1, '\0'), bits));
+  Bytes back;
+  auto source = read_vdb("a.vdb", back);
+  ASSERT_TRUE(source);
+  EXPECT_EQ(source->info().format, VoxelFormat::bitmap);
+  EXPECT_EQ(source->info().dims, Index3(8, 8, 8));
+  for (size_t i = 0; i < 512; ++i) ASSERT_EQ(back[i] != std::byte{0}, i == (5 * 8 + 2) * 8 + 3) << i;
+
+  put("a.vdb",
+      by_hand("int32", std::string(4, '\0'), leaf_values([](int x, int, int z) { return 1000000 * z - x; })));
+  source = read_vdb("a.vdb", back);
+  ASSERT_TRUE(source);
+  EXPECT_EQ(source->info().sample_type, SampleType::i32);
+  EXPECT_EQ(source->info().sample(static_cast<double>(back[3])), -3);
+  EXPECT_EQ(source->info().sample(static_cast<double>(back[7 * 64 + 3])), 6999997);
+  put("a.vdb", by_hand("int64", std::string(8, '\0'),
+                       leaf_values([](int x, int, int) { return (int64_t{1} << 60) + x; })));
+  source = read_vdb("a.vdb", back);
+  ASSERT_TRUE(source);
+  EXPECT_EQ((*source->info().labels)[1], int64_t{1} << 60);
+  EXPECT_EQ(back[2], std::byte{3});
+}
+
+TEST_F(OpenVdb, DoublesAreRoundedAndSaidAndVectorsAreColours) {
+  std::string notes;
+  ctx_.note = [&](const std::string& line) { notes += line; };
+  put("a.vdb",
+      by_hand("double", std::string(8, '\0'), leaf_values([](int x, int, int) { return x / 10.0; })));
+  Bytes back;
+  auto source = read_vdb("a.vdb", back);
+  ASSERT_TRUE(source);
+  EXPECT_EQ(floats_of(back)[3], 0.3f);
+  EXPECT_TRUE(source->info().rounded);
+  EXPECT_NE(notes.find("rounded to 32 bits"), std::string::npos);
+  notes.clear();
+  put("a.vdb", by_hand("vec3i", std::string(12, '\0'), leaf_values([](int x, int y, int) {
+                         return std::array<int, 3>{x, 255, y};
+                       })));
+  ASSERT_TRUE(read_vdb("a.vdb", back));
+  EXPECT_EQ(back[4 * (8 * 2 + 3)], std::byte{3});
+  EXPECT_EQ(back[4 * (8 * 2 + 3) + 1], std::byte{255});
+  EXPECT_EQ(back[4 * (8 * 2 + 3) + 2], std::byte{2});
+  EXPECT_EQ(notes, "");
+  put("a.vdb", by_hand("vec3s", std::string(12, '\0'), leaf_values([](int x, int, int) {
+                         return std::array<float, 3>{-1, 0, static_cast<float>(x)};
+                       })));
+  ASSERT_TRUE(read_vdb("a.vdb", back));
+  EXPECT_NE(notes.find("vectors outside of 0..1"), std::string::npos) << notes;
+}
+
+TEST_F(OpenVdb, TransformsAreAffinesAndOthersAreRefused) {
+  const std::string values = leaf_values([](int x, int, int) { return static_cast<float>(x); });
+  put("a.vdb", by_hand("float", std::string(4, '\0'), values, "AffineMap",
+                       {0, 0.5, 0, 0, -2, 0, 0, 0, 0.1, 0.2, 3, 0, 7, 8, 9, 1}));
+  Bytes back;
+  const auto source = read_vdb("a.vdb", back);
+  ASSERT_TRUE(source);
+  EXPECT_EQ(source->info().affine.axes[0], (Affine::Vector{0, 0.5, 0}));
+  EXPECT_EQ(source->info().affine.axes[1], (Affine::Vector{-2, 0, 0}));
+  EXPECT_EQ(source->info().affine.axes[2], (Affine::Vector{0.1, 0.2, 3}));
+  EXPECT_EQ(source->info().affine.origin, (Affine::Vector{7, 8, 9}));
+  expect_error(put("a.vdb", by_hand("float", std::string(4, '\0'), values, "NonlinearFrustumMap")),
+               "grid g has the transform NonlinearFrustumMap: expected a linear one");
+  for (const char* type : {"ptdataidx32", "string", "mask"})
+    expect_error(put("a.vdb", by_hand(type, std::string(4, '\0'), values)), "unsupported grid type");
+}
+
+TEST_F(OpenVdb, PlacesComeBackToTheLastBit) {
+  VolumeInfo info = make_info({9, 3, 2}, VoxelFormat::float32, SampleType::f32);
+  info.world = World::lps;
+  info.unit = Unit::micrometre;
+  info.description = "a scan";
+  info.slope = 0.1, info.intercept = -1.0 / 3;
+  const Bytes voxels = random_voxels(info);
+  std::vector<Affine> affines{Affine::plain({0.1, 0.1, 0.1}, {1000.7, -0.3, 1e-9}),
+                              Affine::plain({0.1, 1.0 / 3, 2.6755}, {1e6 / 7, 0, -5})};
+  affines.push_back(affines[1]);
+  affines[2].axes[0][0] = -0.1;
+  affines.push_back(affines[1]);
+  affines[3].axes = {{{0.1, 0.7, -0.2}, {0.3, -0.1, 1.0 / 3}, {0.9, 0.1, 0.7}}};
+  for (const Affine& affine : affines) {
+    info.affine = affine;
+    ASSERT_TRUE(write_vdb("a.vdb", info, voxels));
+    Bytes back;
+    const auto source = read_vdb("a.vdb", back);
+    ASSERT_TRUE(source);
+    EXPECT_EQ(source->info().affine, affine);
+    EXPECT_EQ(source->info().world, info.world);
+    EXPECT_EQ(source->info().unit, info.unit);
+    EXPECT_EQ(source->info().description, info.description);
+    EXPECT_EQ(source->info().slope, info.slope);
+    EXPECT_EQ(source->info().intercept, info.intercept);
+    EXPECT_EQ(back, voxels);
+  }
+}
+
+TEST_F(OpenVdb, WideIntegersAndHalfsStayWhatTheyAre) {
+  VolumeInfo info = make_info({3, 1, 1}, VoxelFormat::density8, SampleType::u32);
+  info.labels = std::make_shared<std::vector<int64_t>>(std::vector<int64_t>{0, 7, 4000000000});
+  const Bytes voxels{std::byte{2}, std::byte{0}, std::byte{1}};
+  ASSERT_TRUE(write_vdb("a.vdb", info, voxels));
+  Bytes back;
+  auto source = read_vdb("a.vdb", back);
+  ASSERT_TRUE(source);
+  EXPECT_EQ(source->info().sample_type, SampleType::i64);
+  EXPECT_EQ(*source->info().labels, *info.labels);
+  EXPECT_EQ(back, voxels);
+  info = make_info({2, 1, 1}, VoxelFormat::float32, SampleType::f16);
+  for (const float second : {-5.0f, 0.1f}) {
+    ASSERT_TRUE(write_vdb("a.vdb", info, bytes_of({1.5f, second})));
+    source = read_vdb("a.vdb", back);
+    ASSERT_TRUE(source);
+    EXPECT_EQ(source->info().sample_type, second == 0.1f ? SampleType::f32 : SampleType::f16);
+    EXPECT_EQ(floats_of(back), (std::vector<float>{1.5f, second}));
+  }
 }
 
 TEST_F(OpenVdb, FilesOfOthersSpanTheirActiveVoxels) {
