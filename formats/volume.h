@@ -172,6 +172,8 @@ struct VolumeInfo {
   bool rounded = false;  ///< voxels may be nearest to, not equal to, the samples of the file
   /// What the file has more than one of, and this volume is one of: for people, as "--time 0 of 0..9".
   std::vector<std::string> parts;
+  /// Regular files that the voxels are read from, as far as the reader knows them: not to be written over.
+  std::vector<std::string> files;
 
   Box box() const { return {{0, 0, 0}, dims}; }
   /// The sample that a stored value stands for. Of labels: a stored value beyond the table stands for the

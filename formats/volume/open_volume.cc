@@ -25,10 +25,13 @@ struct Ending {
   Kind kind;
 };
 constexpr Ending endings[] = {
-    {".nrrd", Kind::nrrd}, {".nhdr", Kind::nrrd}, {".nii", Kind::nifti}, {".nii.gz", Kind::nifti},
-    {".mrc", Kind::mrc},   {".map", Kind::mrc},   {".ccp4", Kind::mrc},  {".rec", Kind::mrc},
-    {".raw", Kind::raw},   {".vdb", Kind::vdb},   {".tif", Kind::image}, {".tiff", Kind::image},
-    {".png", Kind::image}, {".exr", Kind::image},
+    {".nrrd", Kind::nrrd},   {".nhdr", Kind::nrrd},    {".nii", Kind::nifti},    {".nii.gz", Kind::nifti},
+    {".hdr", Kind::nifti},   {".hdr.gz", Kind::nifti}, {".img", Kind::nifti},    {".img.gz", Kind::nifti},
+    {".mrc", Kind::mrc},     {".map", Kind::mrc},      {".ccp4", Kind::mrc},     {".rec", Kind::mrc},
+    {".mrc.gz", Kind::mrc},  {".map.gz", Kind::mrc},   {".ccp4.gz", Kind::mrc},  {".rec.gz", Kind::mrc},
+    {".mrc.bz2", Kind::mrc}, {".map.bz2", Kind::mrc},  {".ccp4.bz2", Kind::mrc}, {".rec.bz2", Kind::mrc},
+    {".raw", Kind::raw},     {".vdb", Kind::vdb},      {".tif", Kind::image},    {".tiff", Kind::image},
+    {".png", Kind::image},   {".exr", Kind::image},
 };
 
 Kind kind_of(const std::string& name) {
@@ -69,14 +72,14 @@ Result<bool> holds_dicom(const std::string& folder) {
 auto unknown_output(const std::string& name) {
   return fail(ErrorCode::usage, name,
               "unknown kind of volume: expected one of .nrrd .nhdr .nii .nii.gz .vdb .raw .mrc .map .ccp4 "
-              ".rec, or a pattern "
-              "of images such as slice-%04d.tif");
+              ".rec, or a pattern of images such as slice-%04d.tif");
 }
 
 }  // namespace
 
-Result<std::unique_ptr<VolumeSource>> open_volume(const std::string& name, const OpenOptions& options,
-                                                  Context& ctx) {
+namespace {
+
+SourceResult open_as_it_is(const std::string& name, const OpenOptions& options, Context& ctx) {
   if (name == "-") return open_nrrd(name, options, ctx);
   if (is_builtin(name)) return open_builtin(name);
   std::error_code error;
@@ -110,10 +113,18 @@ Result<std::unique_ptr<VolumeSource>> open_volume(const std::string& name, const
   }
   return bad_input(
       name,
-      "unknown kind of volume: expected one of .nrrd .nhdr .nii .nii.gz .vdb .raw .mrc .map .ccp4 .rec, "
-      "images "
-      "(.tif .png .exr, a folder or a pattern), a DICOM file or a folder of them, or a built-in such as "
-      "menger:5");
+      "unknown kind of volume: expected one of .nrrd .nhdr .nii .hdr .img (each also .gz but the first two), "
+      ".vdb .raw .mrc .map .ccp4 .rec (also .gz .bz2), images (.tif .png .exr, a folder or a pattern), a "
+      "DICOM file or a folder of them, or a built-in such as menger:5");
+}
+
+}  // namespace
+
+Result<std::unique_ptr<VolumeSource>> open_volume(const std::string& name, const OpenOptions& options,
+                                                  Context& ctx) {
+  VOX_TRY(auto source, open_as_it_is(name, options, ctx));
+  if (options.labels && !is_colour(source->info().format)) source->set_labels();
+  return source;
 }
 
 Result<std::unique_ptr<VolumeSink>> create_volume(const std::string& name, const VolumeInfo& info, bool force,

@@ -30,8 +30,9 @@ SinkResult create_nrrd(const std::string& path, const VolumeInfo& info, bool for
 SourceResult open_raw(const std::string& path, const OpenOptions& options, Context& ctx);
 SinkResult create_raw(const std::string& path, const VolumeInfo& info, bool force, Context& ctx);
 
-// nifti.cc: NIfTI-1 and NIfTI-2 single files, .nii and .nii.gz, one time step (header by niftiio, voxels
-// streamed or mapped). Written as NIfTI-1: sides up to 32767.
+// nifti.cc: NIfTI-1, NIfTI-2 and Analyze 7.5: single files (.nii, .nii.gz) and pairs (.hdr and .img, each
+// also .gz; by either name); one volume of several by --time and --channel. Written as NIfTI-1 single files:
+// sides up to 32767.
 SourceResult open_nifti(const std::string& path, const OpenOptions& options, Context& ctx);
 SinkResult create_nifti(const std::string& path, const VolumeInfo& info, bool force, Context& ctx);
 

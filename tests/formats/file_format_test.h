@@ -4,6 +4,7 @@
 #include <gtest/gtest.h>
 #include <unistd.h>
 
+#include <algorithm>
 #include <filesystem>
 #include <fstream>
 #include <functional>
@@ -25,6 +26,7 @@ class FileFormatTest : public testing::Test {
     std::filesystem::remove_all(folder_);
     std::filesystem::create_directory(folder_);
     ctx_.memory = &memory_;
+    ctx_.note = [this](const std::string& line) { notes_.push_back(line); };
   }
   void TearDown() override { std::filesystem::remove_all(folder_); }
 
@@ -140,7 +142,21 @@ class FileFormatTest : public testing::Test {
     }
   }
 
+  /// Whether a note has these words; it is one line.
+  bool noted(const std::string& part) const {
+    return std::any_of(notes_.begin(), notes_.end(), [&](const std::string& note) {
+      EXPECT_EQ(note.find('\n'), std::string::npos) << note;
+      return note.find(part) != std::string::npos;
+    });
+  }
+  std::string all_notes() const {
+    std::string text;
+    for (const std::string& note : notes_) text += note + "\n";
+    return text;
+  }
+
   std::string folder_;
+  std::vector<std::string> notes_;  ///< in the order in which they came
   MemoryBudget memory_;
   Context ctx_;
   VolumeInfo read_info_;  ///< of the last round trip

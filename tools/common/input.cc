@@ -173,6 +173,12 @@ Result<Input> open_as_it_is(const std::string& name, const OpenOptions& options,
 
 Result<Input> open_input(const std::string& name, const OpenOptions& options, Context& ctx) {
   VOX_TRY(Input input, open_as_it_is(name, options, ctx));
+  if (options.labels && input.source) {
+    if (is_colour(input.source->info().format))
+      return bad_usage(fmt::format("--labels: voxels are {}: expected scalars",
+                                   voxkit::name(input.source->info().format)));
+    input.source->set_labels();
+  }
   if (is_compressed(name) || !input.source) return input;
   const VolumeInfo& info = input.source->info();
   if (options.fill && is_colour(info.format))
