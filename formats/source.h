@@ -37,8 +37,9 @@ class VolumeSource {
   virtual void expect(int64_t z0, int64_t z1) const { (void)z0, (void)z1; }
   virtual void release(int64_t z0, int64_t z1) const { (void)z0, (void)z1; }
 
-  /// A user says that values are names of things (VolumeInfo::is_labels). No voxel changes.
+  /// What is said of the voxels from outside (VolumeInfo::is_labels, fill). No voxel changes.
   void set_labels() { info_.is_labels = true; }
+  void set_fill(double stored) { info_.fill = stored; }
 
  protected:
   VolumeInfo info_;

@@ -10,151 +10,25 @@
 #include "formats/mapped_file.h"
 #include "formats/volume/dense_sink.h"
 #include "formats/volume/dense_source.h"
-#include "formats/volume/nrrd_header.h"
+#include "formats/volume/facts.h"
+#include "formats/volume/nrrd_data.h"
 #include "formats/volume/readers.h"
 
 namespace voxkit {
 namespace {
 
 namespace fs = std::filesystem;
+using nrrd::decode;
 using nrrd::Encoding;
 using nrrd::Header;
 using nrrd::Nrrd;
 using nrrd::number;
 
-/// Numbers in text, to samples in the machine's byte order.
-class TextStream final : public InputStream {
- public:
-  TextStream(std::unique_ptr<InputStream> text, SampleType type)
-      : text_(std::move(text)), type_(type), buffer_(size_t{1} << 16) {
-    name_ = text_->name();
-  }
-  Result<size_t> read(std::span<std::byte> out) override {
-    size_t done = 0;
-    while (done < out.size()) {
-      if (sample_begin_ == sample_end_) {
-        VOX_TRY(const bool more, next_sample());
-        if (!more) break;
-      }
-      out[done++] = sample_[sample_begin_++];
-      ++position_;
-    }
-    return done;
-  }
-
- private:
-  Result<bool> next_sample() {
-    std::string token;
-    for (;; ++begin_) {
-      if (begin_ == filled_) {
-        VOX_TRY(filled_, text_->read(std::as_writable_bytes(std::span(buffer_))));
-        begin_ = 0;
-        if (filled_ == 0) break;
-      }
-      const char c = buffer_[begin_];
-      const bool between = c == ' ' || c == ',' || (c >= '\t' && c <= '\r');
-      if (between && !token.empty()) break;
-      if (between) continue;
-      if (token.size() == 64) return wrong(token);
-      token += c;
-    }
-    if (token.empty()) return false;
-    bool stored = false;
-    switch (type_) {
-      case SampleType::u8:
-        stored = store<uint8_t>(token);
-        break;
-      case SampleType::i8:
-        stored = store<int8_t>(token);
-        break;
-      case SampleType::u16:
-        stored = store<uint16_t>(token);
-        break;
-      case SampleType::i16:
-        stored = store<int16_t>(token);
-        break;
-      case SampleType::u32:
-        stored = store<uint32_t>(token);
-        break;
-      case SampleType::i32:
-        stored = store<int32_t>(token);
-        break;
-      case SampleType::u64:
-        stored = store<uint64_t>(token);
-        break;
-      case SampleType::i64:
-        stored = store<int64_t>(token);
-        break;
-      case SampleType::f32:
-        stored = store<float>(token);
-        break;
-      case SampleType::f64:
-        stored = store<double>(token);
-        break;
-      case SampleType::bit:
-      case SampleType::f16:  // the format has neither
-        break;
-    }
-    if (!stored) return wrong(token);
-    ++samples_;
-    return true;
-  }
-  template <class T>
-  bool store(const std::string& token) {
-    const auto value = number<T>(token);
-    if (!value) return false;
-    std::memcpy(sample_, &*value, sizeof(T));
-    sample_begin_ = 0;
-    sample_end_ = sizeof(T);
-    return true;
-  }
-  tl::unexpected<Error> wrong(const std::string& token) const {
-    return bad_input(
-        name_, fmt::format("ascii data, sample {}: \"{}\": expected a number of the header's type", samples_,
-                           token));
-  }
-
-  std::unique_ptr<InputStream> text_;
-  SampleType type_;
-  std::vector<char> buffer_;
-  size_t begin_ = 0, filled_ = 0;
-  std::byte sample_[8]{};
-  size_t sample_begin_ = 0, sample_end_ = 0;
-  uint64_t samples_ = 0;
-};
-
-Status skip_lines(InputStream& stream, int64_t count) {
-  for (int64_t line = 0; line < count; ++line)
-    for (std::byte c{}; c != std::byte{'\n'};) {
-      VOX_TRY(const size_t got, stream.read({&c, 1}));
-      if (got == 0)
-        return bad_input(stream.name(),
-                         fmt::format("ends after {} lines: expected {} before the data", line, count));
-    }
-  return {};
-}
-
-/// The stream of a file's samples, past what is to be skipped. `path` is empty where the file has no name.
-Result<std::unique_ptr<InputStream>> decode(const Nrrd& facts, const std::string& path,
-                                            std::unique_ptr<InputStream> stream, uint64_t bytes) {
-  VOX_CHECK(skip_lines(*stream, facts.line_skip));
-  if (facts.byte_skip < 0) {
-    std::error_code error;
-    const uint64_t size = path.empty() ? 0 : fs::file_size(path, error);
-    if (path.empty() || error) return bad_input(stream->name(), "byte skip -1: expected a regular file");
-    if (size < stream->position() || size - stream->position() < bytes)
-      return bad_input(stream->name(), fmt::format("voxel data end after {} bytes: expected {}",
-                                                   size - std::min(size, stream->position()), bytes));
-    VOX_CHECK(stream->skip(size - bytes - stream->position()));
-    return stream;
-  }
-  if (facts.encoding == Encoding::gzip) stream = gunzip(std::move(stream));
-  if (facts.encoding == Encoding::bzip2) stream = bunzip2(std::move(stream));
-  // As the format has it: lines are skipped in the file, bytes in what is unpacked from it.
-  VOX_CHECK(stream->skip(static_cast<uint64_t>(facts.byte_skip)));
-  if (facts.encoding == Encoding::text)
-    stream = std::make_unique<TextStream>(std::move(stream), facts.layout.type);
-  return stream;
+/// The volume in the samples of a stream.
+SourceResult open_samples(const Nrrd& facts, std::unique_ptr<InputStream> samples, const OpenOptions& options,
+                          Context& ctx) {
+  VOX_CHECK(samples->skip(facts.offset));
+  return strided_source(std::move(samples), facts.strides, facts.info, facts.layout, options, ctx);
 }
 
 /// The data of one file: mapped where they lie in it as they are.
@@ -163,9 +37,38 @@ SourceResult open_data(const Nrrd& facts, const std::string& path, std::unique_p
   VOX_TRY(auto samples, decode(facts, path, std::move(stream), facts.bytes));
   std::error_code error;
   if (facts.encoding != Encoding::raw || path.empty() || !fs::is_regular_file(path, error))
-    return streamed_source(std::move(samples), facts.info, facts.layout, options, ctx);
+    return open_samples(facts, std::move(samples), options, ctx);
   VOX_TRY(auto file, MappedFile::open(path));
-  return mapped_source(std::move(file), samples->position(), facts.info, facts.layout, options, ctx);
+  const uint64_t first = samples->position();
+  const uint64_t there = file->bytes().size() - std::min<uint64_t>(file->bytes().size(), first);
+  if (there < facts.bytes)
+    return bad_input(path, fmt::format("voxel data at byte {} end after {} bytes: expected {}", first, there,
+                                       facts.bytes));
+  return strided_source(std::move(file), first + facts.offset, facts.strides, facts.info, facts.layout,
+                        options, ctx);
+}
+
+/// The path of a data file that a header names. Errors: ErrorCode::input where it is not a regular file, or
+/// outside of the header's folder without leave to be there.
+Result<std::string> data_path(const Header& header, const fs::path& folder, const std::string& name,
+                              const OpenOptions& options) {
+  const auto wrong = [&](const std::string& what) {
+    return bad_input(header.name, fmt::format("data file \"{}\": {}", name.substr(0, 200), what));
+  };
+  if (name.empty()) return wrong("expected the name of a file");
+  const fs::path value(name);
+  const fs::path inside =
+      value.is_absolute()
+          ? value.lexically_normal().lexically_relative(fs::absolute(folder).lexically_normal())
+          : value.lexically_normal();
+  if (!options.allow_outside && (inside.empty() || *inside.begin() == ".."))
+    return wrong("lies outside of the header's folder: expected --allow-outside");
+  std::string path = (folder / value).string();
+  std::error_code error;
+  const fs::file_status status = fs::status(path, error);
+  if (!fs::exists(status)) return bad_input(path, error ? error.message() : "No such file or directory");
+  if (!fs::is_regular_file(status)) return wrong("is not a regular file");
+  return path;
 }
 
 /// The names of several data files: a list, or a printf pattern with a range of numbers.
@@ -187,18 +90,15 @@ struct Parts {
 /// Joins data files, each of which holds the same number of bytes.
 class PartsStream final : public InputStream {
  public:
-  PartsStream(Nrrd facts, Parts parts, fs::path folder, const std::string& name)
-      : facts_(std::move(facts)),
-        parts_(std::move(parts)),
-        folder_(std::move(folder)),
-        part_bytes_(facts_.bytes / static_cast<uint64_t>(parts_.count)) {
+  PartsStream(Nrrd facts, std::vector<std::string> paths, const std::string& name)
+      : facts_(std::move(facts)), paths_(std::move(paths)), part_bytes_(facts_.bytes / paths_.size()) {
     name_ = name;
   }
   Result<size_t> read(std::span<std::byte> out) override {
     size_t done = 0;
-    while (done < out.size() && (left_ > 0 || next_ < parts_.count)) {
+    while (done < out.size() && (left_ > 0 || next_ < paths_.size())) {
       if (left_ == 0) {
-        const std::string path = (folder_ / parts_.name(next_++)).string();
+        const std::string& path = paths_[next_++];
         VOX_TRY(part_, open_stream(path));
         VOX_TRY(part_, decode(facts_, path, std::move(part_), part_bytes_));
         left_ = part_bytes_;
@@ -215,15 +115,22 @@ class PartsStream final : public InputStream {
     }
     return done;
   }
+  /// Files that are skipped as a whole are not opened.
+  Status skip(uint64_t count) override {
+    for (; left_ == 0 && next_ < paths_.size() && count >= part_bytes_; ++next_) {
+      count -= part_bytes_;
+      position_ += part_bytes_;
+    }
+    return InputStream::skip(count);
+  }
 
  private:
   Nrrd facts_;
-  Parts parts_;
-  fs::path folder_;
+  std::vector<std::string> paths_;
   uint64_t part_bytes_;
   std::unique_ptr<InputStream> part_;
   uint64_t left_ = 0;
-  int64_t next_ = 0;
+  size_t next_ = 0;
 };
 
 /// `PREFIX%0Nd SUFFIX FIRST LAST STEP [SUBDIM]`; nothing where the value is no such thing.
@@ -249,7 +156,7 @@ std::optional<Parts> parse_pattern(const std::vector<std::string_view>& tokens) 
   return parts;
 }
 
-SourceResult open_parts(const Header& header, const Nrrd& facts, Parts parts,
+SourceResult open_parts(const Header& header, Nrrd facts, const Parts& parts,
                         std::optional<std::string_view> subdim, const fs::path& folder,
                         const OpenOptions& options, Context& ctx) {
   const int dimension = subdim ? number<int>(*subdim).value_or(0) : std::max(1, facts.dimension - 1);
@@ -265,15 +172,19 @@ SourceResult open_parts(const Header& header, const Nrrd& facts, Parts parts,
                         ? count == pieces
                         : count > 0 && static_cast<uint64_t>(facts.sizes.back()) % count == 0;
   if (!fits) return header.wrong("datafile", fmt::format("{} files, not {}", pieces, count));
-  return streamed_source(std::make_unique<PartsStream>(facts, std::move(parts), folder, header.name),
-                         facts.info, facts.layout, options, ctx);
+  std::vector<std::string> paths;  // no more than there are files
+  for (int64_t i = 0; i < parts.count; ++i) {
+    VOX_TRY(paths.emplace_back(), data_path(header, folder, parts.name(i), options));
+    facts.info.files.push_back(paths.back());
+  }
+  return open_samples(facts, std::make_unique<PartsStream>(facts, std::move(paths), header.name), options,
+                      ctx);
 }
 
-SourceResult open_nrrd(const std::string& path, std::unique_ptr<InputStream> stream,
-                       const OpenOptions& options, Context& ctx) {
-  VOX_TRY(const Header header, nrrd::read_header(*stream));
-  VOX_TRY(const Nrrd facts, nrrd::interpret(header));
+SourceResult open_header(const std::string& path, std::unique_ptr<InputStream> stream, const Header& header,
+                         Nrrd facts, const OpenOptions& options, Context& ctx) {
   const nrrd::Field* data = header.find("datafile");
+  if (!path.empty()) facts.info.files = {path};
   if (!data) return open_data(facts, path, std::move(stream), options, ctx);
   fs::path folder = fs::path(path).parent_path();
   if (folder.empty()) folder = ".";  // also keeps a data file called "-" a file
@@ -283,14 +194,27 @@ SourceResult open_nrrd(const std::string& path, std::unique_ptr<InputStream> str
     Parts parts;
     parts.listed = header.listed;
     parts.count = static_cast<int64_t>(header.listed.size());
-    return open_parts(header, facts, std::move(parts), token(1), folder, options, ctx);
+    return open_parts(header, std::move(facts), parts, token(1), folder, options, ctx);
   }
-  if (auto parts = parse_pattern(tokens))
-    return open_parts(header, facts, std::move(*parts), token(4), folder, options, ctx);
-  if (data->value.empty()) return header.wrong("datafile", "the name of a file");
-  const std::string data_path = (folder / data->value).string();
-  VOX_TRY(auto samples, open_stream(data_path));
-  return open_data(facts, data_path, std::move(samples), options, ctx);
+  if (const auto parts = parse_pattern(tokens))
+    return open_parts(header, std::move(facts), *parts, token(4), folder, options, ctx);
+  VOX_TRY(const std::string samples_path, data_path(header, folder, data->value, options));
+  facts.info.files.push_back(samples_path);
+  VOX_TRY(auto samples, open_stream(samples_path));
+  return open_data(facts, samples_path, std::move(samples), options, ctx);
+}
+
+SourceResult open_nrrd(const std::string& path, std::unique_ptr<InputStream> stream,
+                       const OpenOptions& options, Context& ctx) {
+  VOX_TRY(const Header header, nrrd::read_header(*stream));
+  VOX_TRY(const Nrrd facts, nrrd::interpret(header, options, ctx));
+  VOX_TRY(auto source, open_header(path, std::move(stream), header, facts, options, ctx));
+  if (!facts.fill || is_colour(source->info().format)) return source;
+  const VolumeInfo& info = source->info();  // how wide integers are held is known now
+  const bool is_float = info.format == VoxelFormat::float32;
+  const double stored = is_float ? *facts.fill : info.stored(*facts.fill);
+  if (is_float || info.sample(stored) == *facts.fill) source->set_fill(stored);
+  return source;
 }
 
 /// Samples in NAME.raw, then the header: who finds the header finds the data.
@@ -319,14 +243,17 @@ SourceResult open_nrrd(std::unique_ptr<InputStream> stream, const OpenOptions& o
 SinkResult create_nrrd(const std::string& path, const VolumeInfo& info, bool force, Context&) {
   SampleLayout layout = storage_layout(info);
   if (info.format == VoxelFormat::bitmap) layout.type = SampleType::u8;
-  const fs::path name(path);
-  const bool detached = has_ending(path, ".nhdr");
+  const std::string data_path = nrrd_data_file(path);
   VOX_TRY(auto file, OutputFile::create(path, force));
-  const std::string data_name = detached ? name.stem().string() + ".raw" : std::string();
-  VOX_CHECK(file->write(nrrd::header_text(info, layout, data_name)));
-  if (!detached) return std::make_unique<DenseSink>(std::move(file), info, layout);
-  VOX_TRY(auto data, OutputFile::create((name.parent_path() / data_name).string(), force));
+  VOX_CHECK(file->write(nrrd::header_text(info, layout, fs::path(data_path).filename().string())));
+  if (data_path.empty()) return std::make_unique<DenseSink>(std::move(file), info, layout);
+  VOX_TRY(auto data, OutputFile::create(data_path, force));
   return std::make_unique<DetachedSink>(std::move(file), std::move(data), info, layout);
+}
+
+std::string nrrd_data_file(const std::string& path) {
+  if (!has_ending(path, ".nhdr")) return {};
+  return fs::path(path).replace_extension(".raw").string();
 }
 
 }  // namespace voxkit

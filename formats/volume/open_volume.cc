@@ -160,9 +160,18 @@ Result<std::unique_ptr<VolumeSink>> create_volume(const std::string& name, const
   return unknown_output(name);
 }
 
+std::vector<std::string> files_of_output(const std::string& name) {
+  if (name == "-" || kind_of(name) == Kind::image) return {};
+  std::vector<std::string> files{name};
+  if (const std::string data = nrrd_data_file(name); !data.empty()) files.push_back(data);
+  return files;
+}
+
 Status check_volume_output(const std::string& name, bool force) {
-  if (name != "-" && kind_of(name) == Kind::none) return unknown_output(name);
-  return kind_of(name) == Kind::image ? Status{} : check_output(name, force);
+  if (name == "-") return check_output(name, force);
+  if (kind_of(name) == Kind::none) return unknown_output(name);
+  for (const std::string& file : files_of_output(name)) VOX_CHECK(check_output(file, force));
+  return {};
 }
 
 }  // namespace voxkit

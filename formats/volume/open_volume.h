@@ -4,6 +4,7 @@
 #include <memory>
 #include <optional>
 #include <string>
+#include <vector>
 
 #include "formats/context.h"
 #include "formats/source.h"
@@ -49,6 +50,10 @@ bool is_builtin(const std::string& name);
 /// before creating anything.
 Result<std::unique_ptr<VolumeSink>> create_volume(const std::string& name, const VolumeInfo& info, bool force,
                                                   Context& ctx);
+
+/// The files that `create_volume` writes under this name: one, but for .nhdr, and none that is known for
+/// pictures and "-".
+std::vector<std::string> files_of_output(const std::string& name);
 
 /// The checks of `create_volume` that need no volume, for a tool to run before any work: the kind is known,
 /// and the file may be written (for images: looked at when their number is known).

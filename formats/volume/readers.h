@@ -19,12 +19,15 @@ using VoxelSinkResult = Result<std::unique_ptr<VoxelSink>>;
 using SinkResult = Result<std::unique_ptr<VolumeSink>>;
 
 // nrrd.cc: http://teem.sourceforge.net/nrrd/format.html. Attached (.nrrd, or a stream) and detached (.nhdr)
-// headers; raw, gzip, bzip2 and ascii data; both endians; every integer and floating type; 3 axes of scalars,
-// or 4 with 3 or 4 u8 components first.
+// headers; raw, gzip, bzip2, ascii and hex data; both endians; every integer and floating type; up to 3 axes
+// of space in any order with one of colours (3 or 4 u8), one of time (--time) and one of channels
+// (--channel).
 SourceResult open_nrrd(const std::string& path, const OpenOptions& options, Context& ctx);
 SourceResult open_nrrd(std::unique_ptr<InputStream> stream, const OpenOptions& options, Context& ctx);
 /// Raw little-endian data with attached header; .nhdr: header and, beside it, NAME.raw.
 SinkResult create_nrrd(const std::string& path, const VolumeInfo& info, bool force, Context& ctx);
+/// The file of samples that goes with a detached header; empty for other names.
+std::string nrrd_data_file(const std::string& path);
 
 // raw.cc: headerless samples, x fastest.
 SourceResult open_raw(const std::string& path, const OpenOptions& options, Context& ctx);

@@ -121,8 +121,32 @@ TEST_F(NrrdTest, EveryEncoding) {
   }
   put("v.nrrd", header({{"encoding", "ascii"}, {"type", "float"}, {"sizes", "3 1 1"}}) + "\n-1.5e3 0.25 inf");
   expect_voxels("v.nrrd", sample_text<float>({-1500, 0.25, INFINITY}, false));
-  expect_error(put("v.nrrd", header({{"encoding", "hex"}}) + "\n00"),
-               "line 6: encoding: \"hex\": expected raw");
+  std::string digits;
+  for (const char c : data_) {
+    digits += "0123456789abcdef"[c >> 4];
+    digits += (c % 3 ? "" : c % 2 ? "\n" : " ");
+    digits += "0123456789ABCDEF"[c & 15];
+  }
+  put("v.nrrd", header({{"encoding", "hex"}}) + "\n" + digits + "\n");
+  expect_voxels("v.nrrd", data_);
+  put("v.nrrd", header({{"encoding", "hex"}, {"type", "short"}, {"sizes", "2 1 1"}, {"endian", "big"}}) +
+                    "\n80 01 00 02");
+  expect_voxels("v.nrrd", sample_text<uint16_t>({1, 0x8002}, false));
+  expect_error(put("v.nrrd", header({{"encoding", "hex"}}) + "\n00 0g"),
+               "hex data, byte 1: \"g\": expected hexadecimal digits");
+  expect_error(put("v.nrrd", header({{"encoding", "hex"}}) + "\n00 0"), "end after 1 bytes: expected 24");
+  expect_error(put("v.nrrd", header({{"encoding", "zrl"}}) + "\n00"),
+               "line 6: encoding: \"zrl\": expected raw");
+  // The last bytes, of the file or of what it unpacks to.
+  for (const bool packed : {false, true}) {
+    const std::string junk = "junk bytes" + data_;
+    put("v.nrrd", header({{"encoding", packed ? "gzip" : "raw"}, {"byte skip", "-1"}}) + "\n" +
+                      (packed ? gzip_text(junk) : junk));
+    expect_voxels("v.nrrd", data_);
+    auto source = open_nrrd(std::move(*open_stream(path("v.nrrd"))), {}, ctx_);
+    ASSERT_TRUE(source) << source.error().what;
+    EXPECT_EQ((*read(**source))[0], std::byte{'a'});
+  }
   expect_error(put("v.nrrd", header({{"encoding", "ascii"}}) + "\n1 2 300"), "ascii data, sample 2: \"300\"");
   expect_error(put("v.nrrd", header({{"encoding", "ascii"}}) + "\n1 2 3"), "end after 3 bytes: expected 24");
 }
@@ -151,7 +175,7 @@ TEST_F(NrrdTest, DataInOtherFiles) {
   put("v.nhdr", header({{"byte skip", "-1"}, {"datafile", "./d.raw"}}));
   expect_voxels("v.nhdr", data_);
   put("v.nhdr", header({{"byte skip", "-1"}, {"data file", path("d.raw")}}));
-  expect_voxels("v.nhdr", data_);
+  expect_voxels("v.nhdr", data_);  // an absolute path into the same folder
 
   put("a 1", gzip_text(data_.substr(0, 12)));
   put("b", gzip_text(data_.substr(12)));
@@ -188,7 +212,7 @@ TEST_F(NrrdTest, PlacementAndKinds) {
   EXPECT_EQ((*source)->info().affine.origin, (std::array<double, 3>{1, 0, 0}));
 
   source = open("v.nrrd", header({{"space", "left-posterior-superior"},
-                                  {"space directions", "(0,0,-0.1) ( 3, 4, 0 ) none"},
+                                  {"space directions", "(0,0,-0.1) ( 3, 4, 0 ) (1,0,0)"},
                                   {"space origin", "(7,8,-9.5)"},
                                   {"min", "0"},
                                   {"max", "1"}}) +
@@ -229,8 +253,16 @@ TEST_F(NrrdTest, WhatIsWrittenReadsBack) {
       round_trip(name, make_info(dims, VoxelFormat::rgb24));
       EXPECT_EQ(read_info_.format, VoxelFormat::rgb24);
       round_trip(name, make_info(dims, VoxelFormat::rgba32));
-      round_trip(name, make_info(dims, VoxelFormat::float32, SampleType::f64));
-      EXPECT_EQ(read_info_.sample_type, SampleType::f32);
+      for (SampleType type : {SampleType::u32, SampleType::i32, SampleType::u64, SampleType::i64}) {
+        info = make_info(dims, VoxelFormat::density8, type);
+        info.wide_base = 1000000;
+        auto sink = create_volume(path(name), info, true, ctx_);
+        ASSERT_TRUE(sink && write(**sink, info, random_voxels(info)));
+        auto source = open_volume(path(name), {}, ctx_);
+        ASSERT_TRUE(source) << source.error().what;
+        EXPECT_EQ((*source)->info().sample_type, type);
+        EXPECT_GE((*source)->info().wide_base, 1000000);
+      }
     }
   EXPECT_EQ(get(path("V.NHDR")).find("1."), std::string::npos);
   EXPECT_NE(get(path("V.NHDR")).find("data file: V.raw\n"), std::string::npos);
@@ -260,15 +292,15 @@ TEST_F(NrrdTest, HeaderErrorsNameLineAndField) {
       {{{"type", "block"}}, "line 3: type: \"block\""},
       {{{"type", ""}}, "field type is missing"},
       {{{"dimension", "0"}}, "line 4: dimension"},
-      {{{"dimension", "5"}}, "line 4: dimension"},
+      {{{"dimension", "17"}}, "line 4: dimension"},
       {{{"dimension", "2"}}, "line 5: sizes"},
       {{{"sizes", "4 3"}}, "line 5: sizes"},
       {{{"sizes", "4 3 0"}}, "line 5: sizes"},
       {{{"sizes", "4 3 -2"}}, "line 5: sizes"},
       {{{"sizes", "4 3 2x"}}, "line 5: sizes"},
       {{{"sizes", "99999999999999999999 3 2"}}, "line 5: sizes"},
-      {{{"sizes", "2147483648 2147483648 2147483648"}}, "2^62"},
-      {{{"sizes", "2147483648 2147483648 1"}}, "end after"},
+      {{{"sizes", "2147483648 2147483648 2147483648"}}, "2^59"},
+      {{{"sizes", "536870912 536870912 1"}}, "end after"},
       {{{"encoding", "zip"}}, "line 6: encoding"},
       {{{"type", "short"}}, "field endian is missing"},
       {{{"type", "short"}, {"endian", "middle"}}, "line 7: endian"},
@@ -276,7 +308,8 @@ TEST_F(NrrdTest, HeaderErrorsNameLineAndField) {
       {{{"line skip", "-1"}}, "line 7: lineskip"},
       {{{"line skip", "9223372036854775807"}}, "ends after"},
       {{{"byte skip", "9223372036854775807"}}, "ends after"},
-      {{{"encoding", "gzip"}, {"byte skip", "-1"}}, "line 7: byteskip"},
+      {{{"encoding", "gzip"}, {"byte skip", "-2"}}, "line 7: byteskip"},
+      {{{"encoding", "hex"}, {"byte skip", "-1"}}, "line 7: byteskip"},
       {{{"spacings", "1 2"}}, "line 7: spacings"},
       {{{"spacings", "1 2 0"}}, "line 7: spacings"},
       {{{"spacings", "1 2 inf"}}, "line 7: spacings"},
@@ -286,8 +319,16 @@ TEST_F(NrrdTest, HeaderErrorsNameLineAndField) {
       {{{"space directions", "(1,0,0) (0,0,0) (0,0,1)"}}, "line 7: spacedirections"},
       {{{"space origin", "1 2 3"}}, "line 7: spaceorigin"},
       {{{"kinds", "domain"}}, "line 7: kinds"},
-      {{{"dimension", "4"}, {"sizes", "2 2 2 3"}}, "line 5: sizes"},
-      {{{"dimension", "4"}, {"sizes", "3 2 2 2"}, {"type", "float"}, {"endian", "big"}}, "line 3: type"},
+      {{{"dimension", "4"}, {"sizes", "2 2 2 3"}}, "has 3 time steps: expected --time N"},
+      {{{"dimension", "4"}, {"sizes", "3 2 2 2"}, {"type", "float"}, {"endian", "big"}},
+       "has 2 time steps: expected --time N"},
+      {{{"space", "right-anterior"}}, "line 7: space: \"right-anterior\""},
+      {{{"space dimension", "5"}}, "line 7: spacedimension"},
+      {{{"space", "RAS"}, {"space directions", "(1,0) (0,1) none"}}, "line 8: spacedirections"},
+      {{{"space", "RAS"}, {"space directions", "(1,0,0) (0,1,0) (1,1,0)"}}, "in one plane"},
+      {{{"space", "RAST"}, {"space directions", "(1,0,0,0) (0,1,0,1) (0,0,1,0)"}}, "not along both"},
+      {{{"space", "RAS"}, {"space origin", "(1,2)"}}, "line 8: spaceorigin"},
+      {{{"space", "RAS"}, {"space units", "\"mm\" \"mm\""}}, "line 8: spaceunits"},
       {{{"colour", "red"}}, "line 7: \"colour: red\": unknown field"},
   };
   for (const auto& c : cases) {
