@@ -11,13 +11,15 @@
 namespace voxkit {
 
 /// The samples in which a volume is written: its sample_type where that is an integer or f32 (and what the
-/// format holds), else the plain type of the format; colours as 3 or 4 u8. Little endian.
-SampleLayout storage_layout(const VolumeInfo& info);
+/// format holds), else the plain type of the format; colours as 3 or 4 u8. Half floats are f32, unless
+/// `halves` says that the file can have them. Little endian.
+SampleLayout storage_layout(const VolumeInfo& info, bool halves = false);
 
 /// Writes slabs as samples to an OutputFile, in bounded buffers; `finish` commits it.
 class DenseSink : public VolumeSink {
  public:
-  /// The header is in `file` already.
+  /// The header is in `file` already. The layout is that of `storage_layout`; or f32 for voxels that are no
+  /// floats, of which the sample values are written then.
   DenseSink(std::unique_ptr<OutputFile> file, const VolumeInfo& info, const SampleLayout& layout);
   Status write(int64_t z0, int64_t z1, ConstVoxelSpan voxels) final;
   Status finish() final;
@@ -33,13 +35,15 @@ class DenseSink : public VolumeSink {
   std::unique_ptr<OutputFile> file_;
 
  private:
+  Status put_bits(const std::byte* voxels, int64_t count);
   Status put_voxels(const std::byte* voxels, int64_t count);
 
   VolumeInfo info_;
   SampleLayout layout_;
   int64_t next_z_ = 0;
   std::vector<std::byte> buffer_;
-  std::byte bits_{0};  ///< of a byte begun, where samples are bits
+  std::vector<float> floats_;  ///< of each stored value, where these are not what is written
+  std::byte bits_{0};          ///< of a byte begun, where samples are bits
   int bit_count_ = 0;
 };
 

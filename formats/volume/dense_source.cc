@@ -10,6 +10,7 @@
 #include <vector>
 
 #include "formats/parallel.h"
+#include "formats/volume/half.h"
 #include "formats/volume/wide_integers.h"
 
 namespace voxkit {
@@ -68,16 +69,6 @@ void unpack_bits(const std::byte* in, uint64_t first, int64_t count, std::byte* 
     std::memcpy(out, &bytes, 8);
   }
   while (i < end) one();
-}
-
-/// Half floats, every one of which is a float.
-float half_to_float(uint16_t half) {
-  const uint32_t sign = static_cast<uint32_t>(half & 0x8000) << 16, exponent = half >> 10 & 31,
-                 fraction = half & 0x3ff;
-  if (exponent == 31) return std::bit_cast<float>(sign | 0x7f800000u | fraction << 13);
-  if (exponent > 0) return std::bit_cast<float>(sign | (exponent + 112) << 23 | fraction << 13);
-  const float magnitude = static_cast<float>(fraction) * 0x1p-24f;
-  return std::bit_cast<float>(std::bit_cast<uint32_t>(magnitude) | sign);
 }
 
 const std::string rounding_note = "64-bit floats are rounded to 32 bits";

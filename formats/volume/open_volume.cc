@@ -113,8 +113,8 @@ SourceResult open_as_it_is(const std::string& name, const OpenOptions& options, 
   }
   return bad_input(
       name,
-      "unknown kind of volume: expected one of .nrrd .nhdr .nii .hdr .img (each also .gz but the first two), "
-      ".vdb .raw .mrc .map .ccp4 .rec (also .gz .bz2), images (.tif .png .exr, a folder or a pattern), a "
+      "unknown kind of volume: expected one of .nrrd .nhdr .nii .hdr .img (these three also .gz) .vdb .raw "
+      ".mrc .map .ccp4 .rec (these four also .gz or .bz2), images (.tif .png .exr, a folder or a pattern), a "
       "DICOM file or a folder of them, or a built-in such as menger:5");
 }
 
@@ -123,6 +123,7 @@ SourceResult open_as_it_is(const std::string& name, const OpenOptions& options, 
 Result<std::unique_ptr<VolumeSource>> open_volume(const std::string& name, const OpenOptions& options,
                                                   Context& ctx) {
   VOX_TRY(auto source, open_as_it_is(name, options, ctx));
+  VOX_CHECK(check_not_written(source->info(), options));
   if (options.labels && !is_colour(source->info().format)) source->set_labels();
   return source;
 }
@@ -134,7 +135,7 @@ Result<std::unique_ptr<VolumeSink>> create_volume(const std::string& name, const
   if (name == "-") return create_nrrd(name, info, force, ctx);
   const Kind kind = kind_of(name);
   if (is_wide(info.sample_type) && info.format != VoxelFormat::float32 && !is_colour(info.format) &&
-      (kind == Kind::mrc || kind == Kind::vdb || kind == Kind::image))
+      (kind == Kind::vdb || kind == Kind::image))
     return fail(
         ErrorCode::usage, name,
         fmt::format(
@@ -158,6 +159,28 @@ Result<std::unique_ptr<VolumeSink>> create_volume(const std::string& name, const
       break;
   }
   return unknown_output(name);
+}
+
+Status check_not_written(const VolumeInfo& info, const OpenOptions& options) {
+  std::error_code error;
+  for (const std::string& output : options.outputs) {
+    std::optional<NumberedName> pattern;
+    if (is_numbered(output)) {
+      VOX_TRY(pattern, numbered_name(output));
+    }
+    for (const std::string& input : info.files) {
+      const fs::path path(input);
+      const std::string folder = pattern && !pattern->folder.empty() ? pattern->folder : ".";
+      const bool same =
+          pattern ? pattern->number(path.filename().string()) &&
+                        fs::equivalent(path.has_parent_path() ? path.parent_path() : ".", folder, error)
+                  : fs::equivalent(path, output, error);
+      if (same && !error)
+        return fail(ErrorCode::usage, output,
+                    fmt::format("is part of the input as well ({}): expected another file", input));
+    }
+  }
+  return {};
 }
 
 std::vector<std::string> files_of_output(const std::string& name) {

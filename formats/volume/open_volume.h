@@ -34,6 +34,9 @@ struct OpenOptions {
   /// refused.
   bool real_values = false;
   bool allow_outside = false;  ///< detached headers may name data files outside of their own folder
+  /// Files and patterns that will be written: an input that consists of one of them is refused
+  /// (ErrorCode::usage).
+  std::vector<std::string> outputs;
 };
 
 /// Opens a file or a built-in by its name; reads headers, no voxels. "-" is NRRD on standard input.
@@ -50,6 +53,9 @@ bool is_builtin(const std::string& name);
 /// before creating anything.
 Result<std::unique_ptr<VolumeSink>> create_volume(const std::string& name, const VolumeInfo& info, bool force,
                                                   Context& ctx);
+
+/// What `outputs` says, of a volume opened by other means than open_volume.
+Status check_not_written(const VolumeInfo& info, const OpenOptions& options);
 
 /// The files that `create_volume` writes under this name: one, but for .nhdr, and none that is known for
 /// pictures and "-".

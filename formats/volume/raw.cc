@@ -7,6 +7,8 @@
 #include "formats/mapped_file.h"
 #include "formats/volume/dense_sink.h"
 #include "formats/volume/dense_source.h"
+#include "formats/volume/facts.h"
+#include "formats/volume/parts.h"
 #include "formats/volume/readers.h"
 
 namespace voxkit {
@@ -35,6 +37,7 @@ SourceResult open_raw(const std::string& path, const OpenOptions& options, Conte
                     options.dims   ? "--type is"
                     : options.type ? "--dims is"
                                    : "both are"));
+  VOX_CHECK(only_part(path, options));
   const RawType* type = nullptr;
   for (const RawType& t : raw_types)
     if (t.name == *options.type) type = &t;
@@ -43,6 +46,7 @@ SourceResult open_raw(const std::string& path, const OpenOptions& options, Conte
         "--type {}: expected u8 i8 u16 i16 u32 i32 u64 i64 f16 f32 f64 rgb8 rgba8 or bit", *options.type));
   VolumeInfo info;
   info.dims = *options.dims;
+  info.files = {path};
   info.sample_type = type->type;
   info.format = type->components == 4   ? VoxelFormat::rgba32
                 : type->components == 3 ? VoxelFormat::rgb24
@@ -60,9 +64,18 @@ SourceResult open_raw(const std::string& path, const OpenOptions& options, Conte
   return mapped_source(std::move(file), 0, info, layout, options, ctx);
 }
 
-SinkResult create_raw(const std::string& path, const VolumeInfo& info, bool force, Context&) {
+SinkResult create_raw(const std::string& path, const VolumeInfo& info, bool force, Context& ctx) {
+  const SampleLayout layout = storage_layout(info, true);
   VOX_TRY(auto file, OutputFile::create(path, force));
-  return std::make_unique<DenseSink>(std::move(file), info, storage_layout(info));
+  const auto dropped = not_held(info, {});
+  if (!dropped.empty()) {
+    std::string_view type;
+    for (const RawType& t : raw_types)
+      if (t.type == layout.type && t.components == layout.components) type = t.name;
+    ctx.note(fmt::format("{}: a raw file has samples only, here for --dims {},{},{} --type {}: {} dropped",
+                         path, info.dims.x, info.dims.y, info.dims.z, type, listed(dropped)));
+  }
+  return std::make_unique<DenseSink>(std::move(file), info, layout);
 }
 
 }  // namespace voxkit

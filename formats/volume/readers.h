@@ -39,8 +39,8 @@ SinkResult create_raw(const std::string& path, const VolumeInfo& info, bool forc
 SourceResult open_nifti(const std::string& path, const OpenOptions& options, Context& ctx);
 SinkResult create_nifti(const std::string& path, const VolumeInfo& info, bool force, Context& ctx);
 
-// mrc.cc: MRC2014 / CCP4 maps, modes 0, 1, 2, 6 (and 12 = half float), both endians, any axis order that is
-// x, y, z.
+// mrc.cc: MRC2014 / CCP4 maps, modes 0, 1, 2, 6, 12, 16 and 101, both endians, axes in any order, oblique
+// cells, gzip and bzip2, stacks of volumes (--time). Written: modes 0, 1, 2, 6 and 12.
 SourceResult open_mrc(const std::string& path, const OpenOptions& options, Context& ctx);
 SinkResult create_mrc(const std::string& path, const VolumeInfo& info, bool force, Context& ctx);
 

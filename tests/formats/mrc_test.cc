@@ -1,32 +1,13 @@
 #include <cmath>
 
-#include "tests/formats/file_format_test.h"
+#include "tests/formats/mrc_files.h"
 
 namespace voxkit {
 namespace {
 
 class MrcTest : public FileFormatTest {
  protected:
-  /// A valid header of 1024 bytes.
-  struct Header {
-    explicit Header(int32_t mode, Index3 dims, bool big = false) : big_endian(big) {
-      for (size_t i = 0; i < 3; ++i) {
-        set(4 * i, static_cast<int32_t>(dims[static_cast<int>(i)]));
-        set(28 + 4 * i, static_cast<int32_t>(10));
-        set(40 + 4 * i, 5.0f * static_cast<float>(i + 1));
-        set(64 + 4 * i, static_cast<int32_t>(i + 1));
-      }
-      set(12, mode);
-      set(80, -1.0f);
-      bytes.replace(208, 8, big ? std::string("MAP \x11\x11\0\0", 8) : std::string("MAP DD\0\0", 8));
-    }
-    template <class T>
-    void set(size_t at, T value) {
-      bytes.replace(at, sizeof(T), sample_text<T>({value}, big_endian));
-    }
-    bool big_endian;
-    std::string bytes = std::string(1024, '\0');
-  };
+  using Header = MrcHeader;
   void expect_voxels(const std::string& content, const std::string& expected) {
     auto source = open_volume(put("v.mrc", content), {}, ctx_);
     ASSERT_TRUE(source) << source.error().what;
@@ -127,6 +108,7 @@ TEST_F(MrcTest, WhatIsWrittenReadsBack) {
       for (SampleType type :
            {SampleType::u8, SampleType::i8, SampleType::u16, SampleType::i16, SampleType::f32}) {
         VolumeInfo info = make_info(dims, scalar_format(type), type);
+        info.unit = Unit::angstrom;
         info.affine = Affine::plain({0.25, 2, 0.5}, info.affine.origin);
         info.affine.origin = {-1.5, 0, 64};
         round_trip(name, info);
@@ -157,17 +139,29 @@ TEST_F(MrcTest, HeaderErrorsSayWhatIsExpected) {
     change(h);
     expect_error(put("v.mrc", h.bytes + std::string(48, 'x')), error);
   };
-  refuse([](Header& h) { h.set(12, int32_t{3}); }, "mode 3 at byte 12 is unsupported");
+  refuse([](Header& h) { h.set(12, int32_t{3}); },
+         "mode 3 at byte 12 (complex numbers of 16 bits) is unsupported");
+  refuse([](Header& h) { h.set(12, int32_t{4}); }, "mode 4 at byte 12 (complex numbers of 32 bits)");
+  refuse(
+      [](Header& h) {
+        h.set(12, int32_t{0});
+        h.set(152, int32_t{1146047817});
+        h.set(156, int32_t{16});
+      },
+      "of 4 bits as IMOD's flags say");
+  refuse([](Header& h) { h.set(88, int32_t{401}); }, "4 sections of volumes of 10");
   refuse([](Header& h) { h.set(12, int32_t{77}); }, "mode 77");
   refuse([](Header& h) { h.set(0, int32_t{0}); }, "0 x 3 x 4 voxels");
   refuse([](Header& h) { h.set(8, int32_t{-4}); }, "2 x 3 x -4 voxels");
   refuse([](Header& h) { h.set(8, int32_t{5}); }, "end after 48 bytes: expected 60");
   refuse([](Header& h) { h.set(92, int32_t{4}); }, "end after 44 bytes: expected 48");
-  refuse([](Header& h) { h.set(92, int32_t{-80}); }, "-80 bytes of symmetry records");
-  refuse([](Header& h) { h.set(64, int32_t{2}), h.set(68, int32_t{1}); },
-         "axis order 2,1,3 at byte 64 is unsupported");
-  refuse([](Header& h) { h.set(64, int32_t{3}); }, "axis order 3,2,3 at byte 64: expected 1,2,3");
-  refuse([](Header& h) { h.bytes[208] = 'X'; }, "not an MRC file");
+  refuse([](Header& h) { h.set(92, int32_t{-80}); }, "-80 bytes of extended header");
+  refuse([](Header& h) { h.set(64, int32_t{3}); },
+         "axis order 3,2,3 at byte 64: expected 1, 2 and 3 in some order");
+  refuse([](Header& h) { h.bytes[208] = 'X', h.set(40, -1.0f); },
+         "not an MRC file: expected MAP at byte 208");
+  refuse([](Header& h) { h.bytes[208] = 'X', h.set(12, int32_t{77}); }, "not an MRC file");
+  refuse([](Header& h) { h.bytes[208] = 'X', h.set(68, int32_t{3}); }, "not an MRC file");
   refuse([](Header& h) { h.set(0, INT32_MAX), h.set(4, INT32_MAX), h.set(8, INT32_MAX); }, "voxels");
 }
 

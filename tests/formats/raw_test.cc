@@ -180,6 +180,79 @@ TEST_F(RawTest, WhatIsWrittenReadsBack) {
   }
 }
 
+TEST_F(RawTest, IntegersOfManyBitsAndHalvesAreWrittenAsSuch) {
+  const Index3 dims{2, 1, 1};
+  VolumeInfo info = make_info(dims, VoxelFormat::density8, SampleType::u64);
+  info.labels = std::make_shared<std::vector<int64_t>>(std::vector<int64_t>{7, -1});
+  auto sink = create_volume(path("v.raw"), info, true, ctx_);
+  ASSERT_TRUE(sink && write(**sink, info, {std::byte{1}, std::byte{0}}));
+  EXPECT_EQ(get(path("v.raw")), sample_text<uint64_t>({UINT64_MAX, 7}, false));
+  auto source = open_raw(path("v.raw"), options(dims, "u64"), ctx_);
+  ASSERT_TRUE(source) << source.error().what;
+  EXPECT_EQ(*(*source)->info().labels, *info.labels);
+  put("h.raw", sample_text<uint16_t>({0x3c01, 0xfc00}, false));
+  source = open_raw(path("h.raw"), options(dims, "f16"), ctx_);
+  ASSERT_TRUE(source);
+  info = (*source)->info();
+  EXPECT_EQ(info.sample_type, SampleType::f16);
+  sink = create_volume(path("v.raw"), info, true, ctx_);
+  ASSERT_TRUE(sink && write(**sink, info, *read(**source)));
+  EXPECT_EQ(get(path("v.raw")), get(path("h.raw")));
+  EXPECT_TRUE(notes_.empty()) << all_notes();
+}
+
+TEST_F(RawTest, WhatARawFileCannotHoldIsNamed) {
+  VolumeInfo info = make_info({2, 3, 4}, VoxelFormat::density16, SampleType::i16);
+  info.affine = Affine::plain({1, 1, 2}, {0, 0, 0});
+  info.unit = Unit::millimetre;
+  info.world = World::lps;
+  info.slope = 0.5;
+  info.is_labels = true;
+  info.fill = 32769;
+  info.description = "a head";
+  ASSERT_TRUE(create_volume(path("v.raw"), info, true, ctx_));
+  EXPECT_TRUE(noted(
+      "a raw file has samples only, here for --dims 2,3,4 --type i16: where the volume is, the world LPS, "
+      "the "
+      "unit mm, the slope 0.5 and the intercept 0, that values are labels, that 1 is the fill value and the "
+      "description dropped"))
+      << all_notes();
+  EXPECT_EQ(notes_.size(), 1u);
+}
+
+TEST_F(RawTest, ThereIsOneVolumeInIt) {
+  OpenOptions o = options({1, 1, 1}, "u8");
+  o.time = 0;
+  EXPECT_TRUE(open_raw(put("v.raw", "x"), o, ctx_));
+  o.time = 1;
+  EXPECT_EQ(open_raw(path("v.raw"), o, ctx_).error().what, "--time 1: the file has 1 time step: expected 0");
+}
+
+TEST_F(RawTest, ValuesAreLabelsWhereAUserSaysSo) {
+  for (const bool labels : {false, true}) {
+    OpenOptions o = options({1, 1, 1}, "u8");
+    o.labels = labels;
+    EXPECT_EQ((*open_volume(put("v.raw", "x"), o, ctx_))->info().is_labels, labels);
+  }
+}
+
+TEST_F(RawTest, WhatTheInputConsistsOfIsNotWritten) {
+  OpenOptions o = options({1, 1, 1}, "u8");
+  put("slice-7.raw", "x");
+  for (const std::string& name :
+       {path("slice-7.raw"), path("./slice-7.raw"), path("slice-%d.raw"), path("slice-%01d.raw")}) {
+    o.outputs = {path("other"), name};
+    const auto source = open_volume(path("slice-7.raw"), o, ctx_);
+    ASSERT_FALSE(source) << name;
+    EXPECT_EQ(source.error().code, ErrorCode::usage);
+    EXPECT_NE(source.error().what.find("is part of the input as well"), std::string::npos);
+  }
+  o.outputs = {path("other"), "-", path("slice-%d.tif")};
+  EXPECT_TRUE(open_volume(path("slice-7.raw"), o, ctx_));
+  EXPECT_EQ(files_of_output("a/b.nhdr"), (std::vector<std::string>{"a/b.nhdr", "a/b.raw"}));
+  EXPECT_EQ(files_of_output("a/b.nrrd"), (std::vector<std::string>{"a/b.nrrd"}));
+}
+
 TEST_F(RawTest, SizesMustAgree) {
   const std::string file = put("v.raw", std::string(23, 'x'));
   const auto source = open_raw(file, options({2, 3, 4}, "u8"), ctx_);
