@@ -1,6 +1,7 @@
 // NRRD headers to write.
 #include <fmt/format.h>
 
+#include "formats/volume/facts.h"
 #include "formats/volume/nrrd_header.h"
 
 namespace voxkit::nrrd {
@@ -76,7 +77,8 @@ std::string header_text(const VolumeInfo& info, const SampleLayout& layout, cons
   line("space origin", text(info.affine.origin));
   if (info.unit != Unit::unknown)
     line("space units", fmt::format("\"{0}\" \"{0}\" \"{0}\"", name(info.unit)));
-  if (!info.description.empty()) line("content", info.description);
+  // Whatever a description came from, it is one line.
+  if (const std::string content = text_field(info.description); !content.empty()) line("content", content);
   const auto key = [&](std::string_view name, const auto& value) {
     all += fmt::format("{}:={}\n", name, value);
   };

@@ -21,8 +21,9 @@ using Bytes = std::vector<std::byte>;
 class FileFormatTest : public testing::Test {
  protected:
   void SetUp() override {
-    folder_ = testing::TempDir() + "voxkit-" + testing::UnitTest::GetInstance()->current_test_info()->name() +
-              "-" + std::to_string(getpid());
+    std::string name = testing::UnitTest::GetInstance()->current_test_info()->name();
+    std::replace(name.begin(), name.end(), '/', '-');  // of a test with parameters
+    folder_ = testing::TempDir() + "voxkit-" + name + "-" + std::to_string(getpid());
     std::filesystem::remove_all(folder_);
     std::filesystem::create_directory(folder_);
     ctx_.memory = &memory_;

@@ -209,6 +209,9 @@ TEST_F(NrrdAxesTest, WhatCameInComesBackToTheLastBit) {
       EXPECT_TRUE(notes_.empty()) << all_notes();
     }
   VolumeInfo info = make_info({2, 3, 2}, VoxelFormat::float32, SampleType::f32);
+  info.description = " two\nlines:\r1\n\n";
+  round_trip("v.nrrd", info);
+  EXPECT_EQ(read_info_.description, "two lines: 1");
   info.fill = 1e20f;
   round_trip("v.nrrd", info);
   EXPECT_EQ(read_info_.fill, 1e20f);

@@ -205,23 +205,35 @@ bool is_gzip(Input input) {
 
 }  // namespace
 
+namespace {
+
+/// Of files of several volumes the first.
+OpenOptions any_part() {
+  OpenOptions options;
+  options.any_part = true;
+  return options;
+}
+
+}  // namespace
+
 Verdict read_nrrd(Input input) {
   const std::string path = put(input, "in.nrrd");
-  if (auto verdict = read_source([&](Context& ctx) { return open_nrrd(path, {}, ctx); });
+  if (auto verdict = read_source([&](Context& ctx) { return open_nrrd(path, any_part(), ctx); });
       !verdict.fault.empty())
     return verdict;
   // As from a pipe: nothing is mapped.
-  return read_source([&](Context& ctx) { return open_nrrd(std::make_unique<MemoryStream>(input), {}, ctx); });
+  return read_source(
+      [&](Context& ctx) { return open_nrrd(std::make_unique<MemoryStream>(input), any_part(), ctx); });
 }
 
 Verdict read_nifti(Input input) {
   const std::string path = put(input, is_gzip(input) ? "in.nii.gz" : "in.nii");
-  return read_source([&](Context& ctx) { return open_nifti(path, {}, ctx); });
+  return read_source([&](Context& ctx) { return open_nifti(path, any_part(), ctx); });
 }
 
 Verdict read_mrc(Input input) {
   const std::string path = put(input, "in.mrc");
-  return read_source([&](Context& ctx) { return open_mrc(path, {}, ctx); });
+  return read_source([&](Context& ctx) { return open_mrc(path, any_part(), ctx); });
 }
 
 Verdict read_raw(Input input) {

@@ -140,33 +140,53 @@ std::string run_length_pixels() {
 
 std::vector<std::string> nrrd_seeds() {
   const std::string sizes = "dimension: 3\nsizes: 4 3 2\n", data = pattern(24);
-  return {written("s.nrrd", {4, 3, 2}, VoxelFormat::density8),
-          written("s.nrrd", {4, 3, 2}, VoxelFormat::density16, SampleType::i16),
-          written("s.nrrd", {4, 3, 2}, VoxelFormat::rgba32),
-          "NRRD0004\ntype: uint8\n" + sizes + "encoding: gzip\n\n" + gzip_text(data),
-          "NRRD0005\n# comment\ntype: uchar\nspace: left-posterior-superior\nspace directions: (1,0,0) "
-          "(0,2,0) (0,0,3)\n"
-          "space origin: (1,2,3)\nkey:=value\n" +
-              sizes + "encoding: bzip2\n\n" + bzip2_text(data),
-          "NRRD0001\ntype: float\ndimension: 3\nsizes: 3 1 2\nspacings: 1 NaN 0.5\nencoding: ascii\n\n1 -2.5 "
-          "3e4\nnan inf 6\n",
-          "NRRD0003\ntype: double\ndimension: 3\nsizes: 3 1 1\nendian: big\nencoding: raw\nline skip: "
-          "1\nbyte skip: 2\n\nline\nxx" +
-              pattern(24)};
+  return {
+      written("s.nrrd", {4, 3, 2}, VoxelFormat::density8),
+      written("s.nrrd", {4, 3, 2}, VoxelFormat::density16, SampleType::i16),
+      written("s.nrrd", {4, 3, 2}, VoxelFormat::rgba32),
+      "NRRD0004\ntype: uint8\n" + sizes + "encoding: gzip\n\n" + gzip_text(data),
+      "NRRD0005\n# comment\ntype: uchar\nspace: left-posterior-superior\nspace directions: (1,0,0) "
+      "(0,2,0) (0,0,3)\n"
+      "space origin: (1,2,3)\nkey:=value\n" +
+          sizes + "encoding: bzip2\n\n" + bzip2_text(data),
+      "NRRD0001\ntype: float\ndimension: 3\nsizes: 3 1 2\nspacings: 1 NaN 0.5\nencoding: ascii\n\n1 -2.5 "
+      "3e4\nnan inf 6\n",
+      "NRRD0005\ntype: uchar\ndimension: 5\nsizes: 2 3 2 2 1\nkinds: space 3-color time space list\nspace: "
+      "LPST\nspace units: \"mm\" \"mm\" \"mm\" \"s\"\nspace directions: (1,0,0,0) none (0,0,0,1) (0,1,1,0) "
+      "none\nspace origin: (1,2,3,4)\nmeasurement frame: (1)\nvoxkit fill:=3\nencoding: hex\n\n"
+      "000102030405060708090a0b0c0d0e0f1011121314151617",
+      "NRRD0003\ntype: double\ndimension: 3\nsizes: 3 1 1\nendian: big\nencoding: raw\nline skip: "
+      "1\nbyte skip: 2\n\nline\nxx" +
+          pattern(24)};
 }
 
 std::vector<std::string> nifti_seeds() {
+  // Planes of colours, an extension, both forms of a place.
+  std::string planes = written("s.nii", {3, 2, 6}, VoxelFormat::density8);
+  if (planes.size() > 352) {
+    planes[40] = 5, planes[46] = 2, planes[50] = 3, planes[252] = planes[254] = planes[348] = 1;
+    planes.replace(108, 4, le(384.0f));
+    planes.insert(352, le(int32_t{32}) + le(int32_t{4}) + std::string(24, 'e'));
+    for (size_t i = 0; i < 3; ++i) planes.replace(280 + 20 * i, 4, le(1.0f));
+  }
   return {written("s.nii", {3, 2, 4}, VoxelFormat::density8),
           written("s.nii", {3, 2, 4}, VoxelFormat::float32, SampleType::f32),
           written("s.nii", {3, 2, 4}, VoxelFormat::rgb24),
-          written("s.nii.gz", {3, 2, 4}, VoxelFormat::density16, SampleType::i16)};
+          written("s.nii.gz", {3, 2, 4}, VoxelFormat::density16, SampleType::i16), planes};
 }
 
 std::vector<std::string> mrc_seeds() {
   std::string half = written("s.mrc", {3, 2, 4}, VoxelFormat::density16, SampleType::u16);
   if (half.size() > 12) half[12] = 12;
+  std::string stack = written("s.mrc", {3, 2, 4}, VoxelFormat::density8), turned = stack;
+  if (stack.size() > 224) {
+    stack.replace(88, 4, le(int32_t{401}));
+    stack[36] = 2;
+    turned[64] = 3, turned[72] = 1, turned[12] = 101, turned[220] = 2;
+    turned.replace(52, 4, le(110.0f));
+  }
   return {written("s.mrc", {3, 2, 4}, VoxelFormat::density8),
-          written("s.mrc", {3, 2, 4}, VoxelFormat::float32, SampleType::f32), half};
+          written("s.mrc", {3, 2, 4}, VoxelFormat::float32, SampleType::f32), half, stack, turned};
 }
 
 std::vector<std::string> raw_seeds() {
