@@ -145,6 +145,7 @@ Result<TiledSurface> open_what(const Options& o, const color::Options& options, 
   }
   SurfaceOptions surface = o.surface;
   surface.emission = o.emissive == "add";
+  surface.open.outputs = {o.output};
   surface.kind = o.kind == "thin" ? color::SurfaceKind::thin : color::SurfaceKind::conservative;
   TiledSurface opened;
   VOX_TRY(opened.source, open_surface(o.input, surface, ctx));

@@ -101,7 +101,9 @@ Json json_of(const Encoding& encoding, const Run& run, const svmm::Params& param
 
 Result<int> work(const Options& o, Run& run) {
   VOX_CHECK(check_encoding(o.input, o.output, o.verify, run));
-  Inputs inputs(o.input, o.open, run.ctx);
+  OpenOptions open = o.open;
+  open.outputs = {o.output};
+  Inputs inputs(o.input, open, run.ctx);
   const bool lossless = o.delta ? *o.delta == 0 : o.quality.value_or(90) == 100;
   VOX_TRY(auto source, inputs.open(o.verify || (!lossless && !o.range)));
   VOX_TRY(svmm::Params params, params_of(o, source->info().format));

@@ -86,6 +86,7 @@ Result<int> work(Options& o, Run& run) {
   if (run.options.json && o.output == "-")
     return bad_usage("--json and the output - both use standard output");
   VOX_CHECK(check_distinct(o.input, o.output));
+  o.open.outputs = is_numbered(o.output) ? std::vector{o.output} : files_of_output(o.output);
   VOX_CHECK(check_volume_output(o.output, run.options.force));
 
   VOX_TRY(auto source, open(o, run.ctx));

@@ -3,6 +3,7 @@
 
 #include "formats/container.h"
 #include "formats/copy.h"
+#include "formats/volume/facts.h"
 #include "formats/volume/open_volume.h"
 #include "formats/volume/readers.h"
 #include "tools/common/color_report.h"
@@ -34,10 +35,14 @@ std::string_view format_of(const std::string& file, const Input& input) {
   if (input.color) return "dagc";
   if (is_builtin(file)) return "builtin";
   static constexpr std::pair<std::string_view, std::string_view> endings[] = {
-      {".nhdr", "nrrd"}, {".nii", "nifti"}, {".nii.gz", "nifti"}, {".raw", "raw"}, {".vdb", "vdb"},
-      {".mrc", "mrc"},   {".map", "mrc"},   {".ccp4", "mrc"},     {".rec", "mrc"}, {".nrrd", "nrrd"}};
+      {".nhdr", "nrrd"}, {".nii", "nifti"}, {".hdr", "nifti"}, {".img", "nifti"},
+      {".raw", "raw"},   {".vdb", "vdb"},   {".mrc", "mrc"},   {".map", "mrc"},
+      {".ccp4", "mrc"},  {".rec", "mrc"},   {".nrrd", "nrrd"}};
+  std::string_view name = file;
+  for (const std::string_view packed : {".gz", ".bz2"})
+    if (has_ending(name, packed)) name.remove_suffix(packed.size());
   for (const auto& [ending, format] : endings)
-    if (has_ending(file, ending)) return format;
+    if (has_ending(name, ending)) return format;
   return file == "-" ? "nrrd" : "slices";
 }
 
@@ -163,7 +168,7 @@ std::string text_of(const Options& o, const Input& input, std::optional<uint64_t
   if (info.fill) text += fmt::format("fill value  {:.9g}\n", info.sample(*info.fill));
   if (info.labels) text += fmt::format("values      {} different ones\n", info.labels->size());
   if (info.is_labels) text += "meaning     labels\n";
-  if (!info.description.empty()) text += fmt::format("description {}\n", info.description);
+  if (!info.description.empty()) text += fmt::format("description {}\n", text_field(info.description));
   for (const std::string& part : info.parts) text += fmt::format("part        {}\n", part);
   text += fmt::format("raw bytes   {}\n", raw_bytes(info));
   if (bytes)
@@ -187,6 +192,14 @@ std::string text_of(const Options& o, const Input& input, std::optional<uint64_t
   if (input.color) text += sizes_text(input.color->params());
   if (o.check) text += "check       passed\n";
   return text;
+}
+
+/// Bytes of all files that a volume consists of.
+std::optional<uint64_t> bytes_of(const VolumeInfo& info, const std::string& name) {
+  if (info.files.empty()) return file_bytes(name);
+  uint64_t total = 0;
+  for (const std::string& file : info.files) total += file_bytes(file).value_or(0);
+  return total;
 }
 
 /// Takes voxels and keeps none: to check a plain volume is to read it.
@@ -216,7 +229,8 @@ Result<int> work(const Options& o, Run& run) {
     VOX_CHECK(status);
   }
   const Container* container = container_of(input);
-  const auto bytes = container ? std::optional(container->file_bytes()) : file_bytes(o.file);
+  const auto bytes =
+      container ? std::optional(container->file_bytes()) : bytes_of(input.source->info(), o.file);
   if (run.options.json) {
     VOX_CHECK(print(json_of(o, run, input, bytes).text()));
   } else if (!run.options.quiet) {

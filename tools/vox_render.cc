@@ -152,6 +152,8 @@ FrameOptions options_of(const RenderOptions& o, const Plan& plan) {
   dvr.skip = cast.skip;
   dvr.details = cast.details;
   options.scene = o.scene;
+  options.scene.open.outputs = plan.names;
+  if (!o.report.empty()) options.scene.open.outputs.push_back(o.report);
   options.scene.dvr = o.mode == "dvr";
   options.scene.backend = plan.backend;
   options.shade.phong = phong && !options.scene.dvr;  // there every sample is lit by itself

@@ -7,6 +7,7 @@
 #include <vector>
 
 #include "formats/image/image.h"
+#include "formats/names.h"
 #include "formats/volume/open_volume.h"
 #include "libmetrics/colour_distance.h"
 #include "libmetrics/image_diff.h"
@@ -109,8 +110,11 @@ std::string readable_lines(const VolumeDiff& d) {
 Result<int> compare_volumes(const Options& o, Run& run) {
   if (o.fail_ms_ssim) return bad_usage("--fail-ms-ssim is for images: A and B are volumes");
   if (o.space != "srgb") return bad_usage("--space lab is for images: A and B are volumes");
-  VOX_TRY(const Input a, open_input(o.a, o.open, run.ctx));
-  VOX_TRY(const Input b, open_input(o.b, o.open, run.ctx));
+  OpenOptions open = o.open;
+  if (!o.errors.empty())
+    open.outputs = is_numbered(o.errors) ? std::vector{o.errors} : files_of_output(o.errors);
+  VOX_TRY(const Input a, open_input(o.a, open, run.ctx));
+  VOX_TRY(const Input b, open_input(o.b, open, run.ctx));
   const VolumeInfo& info_a = a.source->info();
   const VolumeInfo& info_b = b.source->info();
   if (info_a.dims != info_b.dims) {

@@ -101,7 +101,9 @@ Result<int> work(const Options& o, Run& run) {
   VOX_CHECK(check_encoding(o.input, o.output, o.verify, run));
   VOX_TRY(vq::Options options, encoder_options(o));
 
-  Inputs inputs(o.input, o.open, run.ctx);
+  OpenOptions open = o.open;
+  open.outputs = {o.output};
+  Inputs inputs(o.input, open, run.ctx);
   // Of floats the range must be known first. What kind of voxels there are, the input tells only when it is
   // open.
   VOX_TRY(auto source, inputs.open(true));

@@ -173,6 +173,7 @@ Result<Input> open_as_it_is(const std::string& name, const OpenOptions& options,
 
 Result<Input> open_input(const std::string& name, const OpenOptions& options, Context& ctx) {
   VOX_TRY(Input input, open_as_it_is(name, options, ctx));
+  if (input.source) VOX_CHECK(check_not_written(input.source->info(), options));
   if (options.labels && input.source) {
     if (is_colour(input.source->info().format))
       return bad_usage(fmt::format("--labels: voxels are {}: expected scalars",
@@ -209,8 +210,17 @@ std::optional<uint64_t> file_bytes(const std::string& name) {
 
 Status check_distinct(const std::string& input, const std::string& output) {
   std::error_code error;
+  const auto refused = [](const std::string& file) {
+    return fail(ErrorCode::usage, file, "is the input as well: expected another file");
+  };
+  if (output != "-" && is_numbered(output) &&
+      fs::absolute(input).lexically_normal() == fs::absolute(output).lexically_normal())
+    return refused(output);
+  for (const std::string& file : files_of_output(output))
+    if (fs::equivalent(input, file, error) && !error && fs::is_regular_file(input, error))
+      return refused(file);
   if (fs::equivalent(input, output, error) && !error && fs::is_regular_file(input, error))
-    return fail(ErrorCode::usage, output, "is the input as well: expected another file");
+    return refused(output);
   return {};
 }
 

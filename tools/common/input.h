@@ -38,7 +38,8 @@ Result<std::shared_ptr<const Container>> open_container(const std::string& name,
 bool is_compressed(const std::string& name);
 /// Bytes of the file, or of all files of a folder; nothing for built-ins, patterns and streams.
 std::optional<uint64_t> file_bytes(const std::string& name);
-/// Refuses an output that is the input file itself: ErrorCode::usage.
+/// Refuses an output that is, or of which a part is, the input file itself: ErrorCode::usage. Of other files
+/// that an input consists of, OpenOptions::outputs takes care.
 Status check_distinct(const std::string& input, const std::string& output);
 
 }  // namespace voxkit::cli
