@@ -96,7 +96,7 @@ class RayPacket {
  private:
   [[gnu::always_inline]] static Approach<Real> approach(const CastParams& params, const Mirrored& mirrored,
                                                         int x, int y) {
-    Real u, v;
+    Real u{}, v{};
     for (int i = 0; i < lanes; ++i) u[i] = x + i % width + 0.5, v[i] = y + i / width + 0.5;
     Real towards[3];
     for (int a = 0; a < 3; ++a) towards[a] = params.corner[a] + (params.across[a] * u + params.down[a] * v);

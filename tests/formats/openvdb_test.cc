@@ -13,6 +13,13 @@
 namespace voxkit {
 namespace {
 
+template <class Set>
+OpenOptions with(const Set& set) {
+  OpenOptions options;
+  set(options);
+  return options;
+}
+
 OpenOptions grid_named(const std::string& name) {
   OpenOptions options;
   options.grid = name;
@@ -270,7 +277,7 @@ TEST_F(OpenVdb, GridsAreFoundByName) {
   ASSERT_FALSE(unnamed);
   EXPECT_EQ(unnamed.error().what,
             "2 grids: expected --grid NAME with one of density (Tree_float_5_4_3), color (Tree_vec3s_5_4_3)");
-  const auto any = open_vdb(path("both.vdb"), {.any_part = true}, ctx_);
+  const auto any = open_vdb(path("both.vdb"), with([&](OpenOptions& o) { o.any_part = true; }), ctx_);
   ASSERT_TRUE(any);
   EXPECT_EQ((*any)->info().parts.size(), 1u);
   ASSERT_TRUE(read_vdb("both.vdb", first, "density"));

@@ -14,6 +14,13 @@
 namespace voxkit {
 namespace {
 
+template <class Set>
+OpenOptions with(const Set& set) {
+  OpenOptions options;
+  set(options);
+  return options;
+}
+
 /// A PNG file by hand; `rows` with the byte of the filter before each.
 struct Png {
   uint32_t width = 1, height = 1;
@@ -89,17 +96,19 @@ TEST_F(PngStack, SamplesAreKeptAsTheyAreStored) {
   EXPECT_NE(read_file({.width = 1, .colour = 4, .rows = std::string("\0ab", 3)})
                 .find("--channel N with a number from 0 to 1"),
             std::string::npos);
-  EXPECT_EQ(read_file({.width = 1, .colour = 4, .rows = std::string("\0ab", 3)}, {.channel = 1}), "b");
-  EXPECT_EQ(
-      read_file({.width = 1, .bits = 16, .colour = 2, .rows = std::string("\0\0a\0b\0c", 7)}, {.channel = 2}),
-      std::string("c\0", 2));
+  EXPECT_EQ(read_file({.width = 1, .colour = 4, .rows = std::string("\0ab", 3)},
+                      with([&](OpenOptions& o) { o.channel = 1; })),
+            "b");
+  EXPECT_EQ(read_file({.width = 1, .bits = 16, .colour = 2, .rows = std::string("\0\0a\0b\0c", 7)},
+                      with([&](OpenOptions& o) { o.channel = 2; })),
+            std::string("c\0", 2));
 }
 
 TEST_F(PngStack, PalettesAreGreyOrColoursOrLabels) {
   Png png{.width = 4, .bits = 2, .colour = 3, .rows = std::string("\0\x1b", 2), .palette = "aaabbbcccddd"};
   EXPECT_EQ(read_file(png), "abcd");
   EXPECT_EQ(info_.format, VoxelFormat::density8);
-  EXPECT_EQ(read_file(png, {.labels = true}), std::string("\0\1\2\3", 4));
+  EXPECT_EQ(read_file(png, with([&](OpenOptions& o) { o.labels = true; })), std::string("\0\1\2\3", 4));
   EXPECT_TRUE(info_.is_labels);
   png.palette[1] = 'x';
   EXPECT_EQ(read_file(png), "axabbbcccddd");
