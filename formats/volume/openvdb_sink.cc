@@ -6,6 +6,7 @@
 #include <cstring>
 #include <fstream>
 #include <memory>
+#include <sstream>
 #include <type_traits>
 
 #include "formats/little_endian.h"
@@ -38,7 +39,15 @@ openvdb::math::Transform::Ptr transform_of(const VolumeInfo& info) {
     }
     map = std::make_shared<math::AffineMap>(m);
   }
-  return std::make_shared<math::Transform>(map);
+  // A transform that is made of a map is simplified, by differences of places, which costs bits; one that is
+  // read is not.
+  std::stringstream bytes;
+  openvdb::io::setCurrentVersion(bytes);
+  openvdb::writeString(bytes, map->type());
+  map->write(bytes);
+  auto transform = std::make_shared<math::Transform>();
+  transform->read(bytes);
+  return transform;
 }
 
 void set_metadata(openvdb::GridBase& grid, const VolumeInfo& info) {

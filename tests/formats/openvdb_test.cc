@@ -312,7 +312,7 @@ std::string by_hand(const std::string& type, const std::string& background, cons
   const auto put = [&](auto value) { file.append(reinterpret_cast<const char*>(&value), sizeof value); };
   const auto text = [&](const std::string& word) { put(static_cast<uint32_t>(word.size())), file += word; };
   put(int64_t{0x56444220}), put(uint32_t{224}), put(uint32_t{10}), put(uint32_t{0}), put(char{1});
-  file += std::string(36, '0');
+  file += "00000000-0000-0000-0000-000000000000";
   put(uint32_t{0}), put(int32_t{1});
   text("g"), text("Tree_" + type + "_5_4_3"), text("");
   const size_t offsets = file.size();
