@@ -11,7 +11,7 @@
 #include <system_error>
 
 #include "formats/natural_order.h"
-#include "formats/volume/part_choice.h"
+#include "formats/volume/parts.h"
 
 namespace voxkit {
 namespace {
@@ -198,7 +198,13 @@ class Planner {
   }
 
   Result<int64_t> choose_time(int64_t times) {
-    return choose_part(name_, {"time", "time steps", times}, options_.time, options_.any_part, plan_.parts);
+    VolumeInfo info;
+    VOX_TRY(const auto chosen, choose_parts(name_,
+                                            {{"--time", "time steps", times, options_.time},
+                                             {"--channel", "channels", 1, options_.channel}},
+                                            options_, info));
+    plan_.parts.insert(plan_.parts.end(), info.parts.begin(), info.parts.end());
+    return chosen[0];
   }
 
   void place_axes(bool placed) {

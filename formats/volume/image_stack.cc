@@ -15,7 +15,7 @@
 #include "formats/volume/exact_samples.h"
 #include "formats/volume/image_names.h"
 #include "formats/volume/image_stack_sink.h"
-#include "formats/volume/part_choice.h"
+#include "formats/volume/parts.h"
 #include "formats/volume/png_stack.h"
 #include "formats/volume/sliced_source.h"
 #include "formats/volume/tiff_stack.h"
@@ -149,9 +149,12 @@ class ImageStack : public SlicedSource {
           fmt::format("image is {}: expected 1 channel, or 3 or 4 of 8 bits{}", describe(spec_),
                       kind ? fmt::format(", or --channel N with a number from 0 to {}", spec_.nchannels - 1)
                            : std::string()));
-    VOX_TRY(const int64_t channel, choose_part(name, {"channel", "channels", one ? 1 : spec_.nchannels},
-                                               options.channel, options.any_part, info_.parts));
-    kind_ = one ? *kind : *pixel_kind(spec_, channel);
+    VOX_TRY(const auto chosen,
+            choose_parts(name,
+                         {{"--time", "time steps", 1, options.time},
+                          {"--channel", "channels", one ? 1 : spec_.nchannels, options.channel}},
+                         options, info_));
+    kind_ = one ? *kind : *pixel_kind(spec_, chosen[1]);
     return {};
   }
 

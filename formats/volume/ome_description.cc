@@ -8,7 +8,7 @@
 #include <map>
 #include <set>
 
-#include "formats/volume/part_choice.h"
+#include "formats/volume/parts.h"
 
 namespace voxkit {
 namespace {
@@ -227,9 +227,12 @@ Result<StackDescription> describe_ome(const std::string& file, std::string_view 
     if (error != std::errc() || stop != end) return wrong("--series: expected the number of an image");
     asked = number;
   }
-  VOX_TRY(const int64_t index, choose_part(file, {"series", "images of OME", std::ssize(document.images)},
-                                           asked, options.any_part, said.parts));
-  const Image& image = document.images[static_cast<size_t>(index)];
+  VolumeInfo info;
+  VOX_TRY(
+      const auto chosen,
+      choose_parts(file, {{"--series", "images of OME", std::ssize(document.images), asked}}, options, info));
+  said.parts = info.parts;
+  const Image& image = document.images[static_cast<size_t>(chosen[0])];
 
   std::set<std::string> files;
   for (const TiffData& data : image.data)

@@ -9,7 +9,7 @@
 #include "formats/image/image_check.h"
 #include "formats/image/png_file.h"
 #include "formats/volume/dense_source.h"
-#include "formats/volume/part_choice.h"
+#include "formats/volume/parts.h"
 #include "formats/volume/sliced_source.h"
 
 namespace voxkit {
@@ -104,7 +104,7 @@ class PngStack final : public SlicedSource {
                                               : SampleType::u16;
     kind_ = {From::samples, scalar_format(type), type, 0};
     if (!head_.palette.empty()) {
-      VOX_CHECK(choose_part(files_.front(), {"channel", "channels", 1}, options.channel, false, info_.parts));
+      VOX_CHECK(only_part(files_.front(), options));
       if (options.labels) return {};
       const bool grey = is_grey(head_);
       kind_ = {grey                ? From::grey_palette
@@ -118,7 +118,7 @@ class PngStack final : public SlicedSource {
     }
     const bool colour = head_.samples >= 3 && head_.bits == 8;
     if (head_.samples == 1 || (colour && !options.channel)) {
-      VOX_CHECK(choose_part(files_.front(), {"channel", "channels", 1}, options.channel, false, info_.parts));
+      VOX_CHECK(only_part(files_.front(), options));
       if (head_.samples == 1) return {};
       const bool alpha = head_.samples == 4 || head_.transparent_value;
       kind_ = {head_.transparent_value ? From::transparent_rgb : From::samples,
@@ -131,10 +131,12 @@ class PngStack final : public SlicedSource {
           fmt::format("image is {}: expected 1 channel, or 3 or 4 of 8 bits, or --channel N with a "
                       "number from 0 to {}",
                       describe(head_), head_.samples - 1));
-    VOX_TRY(const int64_t channel, choose_part(files_.front(), {"channel", "channels", head_.samples},
-                                               options.channel, options.any_part, info_.parts));
+    VOX_TRY(const auto chosen, choose_parts(files_.front(),
+                                            {{"--time", "time steps", 1, options.time},
+                                             {"--channel", "channels", head_.samples, options.channel}},
+                                            options, info_));
     kind_.from = From::channel;
-    kind_.channel = static_cast<int>(channel);
+    kind_.channel = static_cast<int>(chosen[1]);
     return {};
   }
 

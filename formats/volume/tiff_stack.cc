@@ -15,7 +15,7 @@
 #include "formats/image/tiff_chunks.h"
 #include "formats/image/tiff_file.h"
 #include "formats/volume/exact_samples.h"
-#include "formats/volume/part_choice.h"
+#include "formats/volume/parts.h"
 #include "formats/volume/sliced_source.h"
 #include "formats/volume/stack_description.h"
 #include "formats/volume/tiff_pixels.h"
@@ -186,13 +186,11 @@ class TiffStack final : public SlicedSource {
   Status choose(const StackDescription& said) {
     const std::string& name = files_.front();
     info_.parts = said.parts;
-    VOX_TRY(time_, choose_part(name, {"time", "time steps", said.times}, options_.time, options_.any_part,
-                               info_.parts));
     const bool colour = page_.photometric == 3 || is_tiff_colour(page_);
     // Samples of a pixel are channels where they are no colour, or one of them is asked for.
     const bool of_samples = page_.samples > 1 && (!colour || (options_.channel && said.channels == 1));
     const int64_t samples = of_samples ? page_.samples : 1;
-    const Parts channels{"channel", "channels", said.channels * samples};
+    const int64_t channels = said.channels * samples;
     OpenOptions options = options_;
     options.channel.reset();
     if (of_samples) options.channel = 0;
@@ -201,9 +199,13 @@ class TiffStack final : public SlicedSource {
       return bad_input(name,
                        fmt::format("image is {}: expected 1 channel, or 3 or 4 of 8 bits, or --channel N "
                                    "with a number from 0 to {}",
-                                   describe(page_), channels.count - 1));
-    VOX_TRY(const int64_t channel,
-            choose_part(name, channels, options_.channel, options_.any_part, info_.parts));
+                                   describe(page_), channels - 1));
+    VOX_TRY(const auto chosen, choose_parts(name,
+                                            {{"--time", "time steps", said.times, options_.time},
+                                             {"--channel", "channels", channels, options_.channel}},
+                                            options_, info_));
+    time_ = chosen[0];
+    const int64_t channel = chosen[1];
     channel_ = channel / samples;
     VOX_TRY(pixels_,
             tiff_pixels(*first_, page_, static_cast<int>(of_samples ? channel % samples : 0), options));
