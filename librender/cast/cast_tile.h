@@ -145,9 +145,8 @@ static void cast_tile_generic(const CastParams& params, const View& view, const 
 }
 #ifdef VOXKIT_AVX2
 template <class View>
-[[gnu::target("avx2,bmi,bmi2,lzcnt,popcnt,fma")]] static void cast_tile_avx2(
-    const CastParams& params, const View& view, const TileRect& tile, Pixel* pixels, PixelDetail* details,
-    TileCounts& count) {
+VOXKIT_AVX2_CODE static void cast_tile_avx2(const CastParams& params, const View& view, const TileRect& tile,
+                                            Pixel* pixels, PixelDetail* details, TileCounts& count) {
   cast_tile<2>(params, view, tile, pixels, details, count);
 }
 #endif

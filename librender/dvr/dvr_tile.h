@@ -55,8 +55,8 @@ void draw_generic(const DvrParams& params, Sampler& sampler, const DvrTile& tile
 }
 #ifdef VOXKIT_AVX2
 template <DvrGradient kind, class Sampler>
-[[gnu::target("avx2")]] void draw_avx2(const DvrParams& params, Sampler& sampler, const DvrTile& tile,
-                                       Frame& frame, bool details, DvrCounts& count) {
+VOXKIT_AVX2_CODE void draw_avx2(const DvrParams& params, Sampler& sampler, const DvrTile& tile, Frame& frame,
+                                bool details, DvrCounts& count) {
   draw_tile<Avx2Lanes, kind>(params, sampler, tile, frame, details, count);
 }
 #endif
