@@ -37,6 +37,7 @@ class DicomSeries final : public SlicedSource {
     info.unit = plan.unit;
     info.description = first.description;
     info.parts = plan.parts;
+    for (const DicomHeader& h : plan.files) info.files.push_back(h.path);
     info.is_labels = options.labels && !is_colour(info.format);
     if (!checked_voxels(info.dims)) return bad_input(name, "series has too many voxels");
     VOX_CHECK(series->scale(name, options, ctx));

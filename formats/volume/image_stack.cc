@@ -95,6 +95,7 @@ class ImageStack : public SlicedSource {
     std::unique_ptr<ImageStack> stack(new ImageStack);
     stack->limit_ = ctx.memory->limit();
     stack->files_ = std::move(files);
+    stack->info_.files = stack->files_;
     const std::string& name = stack->files_.front();
     VOX_TRY(auto first, open_image(name, stack->limit_));
     stack->spec_ = first->spec();

@@ -40,6 +40,7 @@ class PngStack final : public SlicedSource {
   static SourceResult open(std::vector<std::string> files, const OpenOptions& options, Context& ctx) {
     std::unique_ptr<PngStack> stack(new PngStack);
     stack->files_ = std::move(files);
+    stack->info_.files = stack->files_;
     const std::string& name = stack->files_.front();
     VOX_TRY(stack->head_, read_png_head(name));
     const PngHead& head = stack->head_;

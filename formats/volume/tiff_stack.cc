@@ -79,6 +79,7 @@ class TiffStack final : public SlicedSource {
     std::unique_ptr<TiffStack> stack(new TiffStack);
     stack->limit_ = ctx.memory->limit();
     stack->files_ = std::move(files);
+    stack->info_.files = stack->files_;
     stack->options_ = options;
     VOX_TRY(stack->first_, TiffFile::open(stack->files_.front()));
     VOX_CHECK(stack->plan(pages, ctx));

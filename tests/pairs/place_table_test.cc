@@ -6,6 +6,7 @@
 #include <filesystem>
 
 #include "formats/container.h"
+#include "formats/module.h"
 #include "formats/volume/facts.h"
 #include "libsvmm/svmm.h"
 #include "libvq/vq.h"
@@ -19,6 +20,7 @@ struct Place {
   Affine affine;
   World world = World::ras;
   Unit unit = Unit::millimetre;
+  int space_code = 0;
 };
 
 std::vector<Place> places() {
@@ -56,10 +58,18 @@ std::vector<Place> places() {
   return all;
 }
 
-enum class Format { nrrd, nhdr, nii, nii_gz, mrc, raw, svmm, vqv };
-constexpr Format formats[] = {Format::nrrd, Format::nhdr, Format::nii,  Format::nii_gz,
-                              Format::mrc,  Format::raw,  Format::svmm, Format::vqv};
-constexpr const char* endings[] = {"nrrd", "nhdr", "nii", "nii.gz", "mrc", "raw", "svmm", "vqv"};
+enum class Format { nrrd, nhdr, nii, nii_gz, mrc, raw, svmm, vqv, vdb, tif };
+constexpr const char* endings[] = {"nrrd", "nhdr", "nii", "nii.gz", "mrc",
+                                   "raw",  "svmm", "vqv", "vdb",    "tif"};
+constexpr size_t format_count = std::size(endings);
+
+/// Without the module of a format there is nothing to ask it.
+bool is_there(Format format) {
+  const char* const module = format == Format::vdb   ? "openvdb"
+                             : format == Format::tif ? "image_stack"
+                                                     : nullptr;
+  return !module || std::filesystem::exists(module_folder() + "/" + module + ".so");
+}
 
 class PlaceTable : public FileFormatTest, public testing::WithParamInterface<Format> {
  protected:
@@ -68,7 +78,8 @@ class PlaceTable : public FileFormatTest, public testing::WithParamInterface<For
   /// Writes a volume of this place; notes_ has what was said.
   std::string written(const std::string& stem, Format format, VolumeSource& source) {
     notes_.clear();
-    const std::string name = path(stem + "." + endings[static_cast<size_t>(format)]);
+    const std::string name =
+        path(stem + (format == Format::tif ? "-%d." : ".") + endings[static_cast<size_t>(format)]);
     if (format == Format::svmm || format == Format::vqv) {
       std::string bytes;
       const ByteSink sink = [&](std::span<const std::byte> part) -> Status {
@@ -152,6 +163,12 @@ Expected through(Format format, Place place) {
       place.world = World::unknown;
       return {place, 3e-7, world_lost || !cell || (unit_unknown && !default_place)};
     }
+    case Format::tif: {
+      // Spacing and origin; of other axes the lengths.
+      const bool plain = affine.is_plain();
+      if (!plain) affine = Affine::plain(affine.spacing(), {0, 0, 0});
+      return {place, 0, !plain || place.space_code != 0};
+    }
     default:
       return {place};
   }
@@ -184,6 +201,7 @@ void expect_place(const VolumeInfo& info, const Expected& expected) {
 
 TEST_P(PlaceTable, FromThisFormatToEachOther) {
   const Format first = GetParam();
+  if (!is_there(first)) GTEST_SKIP() << "built without its module";
   VolumeInfo info = make_info(dims_, VoxelFormat::density8);
   const Bytes voxels = random_voxels(info);
   for (const Place& place : places()) {
@@ -212,11 +230,13 @@ TEST_P(PlaceTable, FromThisFormatToEachOther) {
     ASSERT_TRUE(source);
     EXPECT_TRUE(notes_.empty()) << all_notes();
     expect_place(source->info(), once);
-    for (const Format second : formats) {
+    for (size_t f = 0; f < format_count; ++f) {
+      const auto second = static_cast<Format>(f);
+      if (!is_there(second)) continue;
       SCOPED_TRACE(testing::Message() << "then as " << endings[static_cast<size_t>(second)]);
       if (source->forward_only()) source = opened(from, first);
       const VolumeInfo& now = source->info();
-      const Expected twice = through(second, {place.name, now.affine, now.world, now.unit});
+      const Expected twice = through(second, {place.name, now.affine, now.world, now.unit, now.space_code});
       const std::string to = written("to", second, *source);
       EXPECT_EQ(!notes_.empty(), twice.lost) << all_notes();
       auto back = opened(to, second);
@@ -229,11 +249,14 @@ TEST_P(PlaceTable, FromThisFormatToEachOther) {
   }
 }
 
-INSTANTIATE_TEST_SUITE_P(Formats, PlaceTable, testing::ValuesIn(formats), [](const auto& format) {
-  std::string name = endings[static_cast<size_t>(format.param)];
-  std::replace(name.begin(), name.end(), '.', '_');
-  return name;
-});
+INSTANTIATE_TEST_SUITE_P(Formats, PlaceTable,
+                         testing::Values(Format::nrrd, Format::nhdr, Format::nii, Format::nii_gz, Format::mrc,
+                                         Format::raw, Format::svmm, Format::vqv, Format::vdb, Format::tif),
+                         [](const auto& format) {
+                           std::string name = endings[static_cast<size_t>(format.param)];
+                           std::replace(name.begin(), name.end(), '.', '_');
+                           return name;
+                         });
 
 }  // namespace
 }  // namespace voxkit
