@@ -36,7 +36,7 @@ struct OpenOptions {
   bool allow_outside = false;  ///< detached headers may name data files outside of their own folder
   /// Files and patterns that will be written: an input that consists of one of them is refused
   /// (ErrorCode::usage).
-  std::vector<std::string> outputs{};
+  std::vector<std::string> outputs;
 };
 
 /// Opens a file or a built-in by its name; reads headers, no voxels. "-" is NRRD on standard input.

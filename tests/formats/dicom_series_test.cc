@@ -12,6 +12,13 @@
 namespace voxkit {
 namespace {
 
+template <class Set>
+OpenOptions with(const Set& set) {
+  OpenOptions options;
+  set(options);
+  return options;
+}
+
 std::string le(uint64_t value, int bytes) {
   std::string raw;
   for (int i = 0; i < bytes; ++i) raw += static_cast<char>(value >> (8 * i));
@@ -148,18 +155,18 @@ TEST_F(DicomVolume, MissingSlicesAreRefusedByTheirPositions) {
   expect_refused(
       "the slice at 6 mm is missing, between i1.dcm at 3 mm and i2.dcm at 9 mm: expected equal "
       "distances, or --gaps accept or fill");
-  auto voxels = open({}, {.gaps = OpenOptions::Gaps::accept});
+  auto voxels = open({}, with([&](OpenOptions& o) { o.gaps = OpenOptions::Gaps::accept; }));
   ASSERT_TRUE(voxels) << voxels.error().what;
   EXPECT_EQ(info_.affine.axes[2][2], 4);
   EXPECT_NE(notes_.find("taken to be 4 mm apart"), std::string::npos);
-  voxels = open({}, {.gaps = OpenOptions::Gaps::fill});
+  voxels = open({}, with([&](OpenOptions& o) { o.gaps = OpenOptions::Gaps::fill; }));
   ASSERT_TRUE(voxels) << voxels.error().what;
   EXPECT_EQ(firsts(*voxels), (std::vector<int>{-2, -1, -2, 0, 1}));
   EXPECT_EQ(info_.affine.axes[2][2], 3);
   EXPECT_NE(notes_.find("1 slices that are missing are filled with -2"), std::string::npos) << notes_;
   put("i3.dcm", File{}.at("0\\0\\13").bytes());
   expect_refused("between i2.dcm at 9 mm and i3.dcm at 13 mm: no whole number of slices",
-                 {.gaps = OpenOptions::Gaps::fill});
+                 with([&](OpenOptions& o) { o.gaps = OpenOptions::Gaps::fill; }));
   std::filesystem::remove(path("i2.dcm"));
   put("i3.dcm", File{}.at("0\\0\\6.5").bytes());
   expect_refused("slices are unevenly far apart");
@@ -173,7 +180,7 @@ TEST_F(DicomVolume, MissingSlicesAreRefusedByTheirPositions) {
                                        .set(0x28, 0x120, "SS", le(0xf830, 2))
                                        .data(sample(i))
                                        .bytes());
-  voxels = open({}, {.gaps = OpenOptions::Gaps::fill});
+  voxels = open({}, with([&](OpenOptions& o) { o.gaps = OpenOptions::Gaps::fill; }));
   ASSERT_TRUE(voxels) << voxels.error().what;
   EXPECT_EQ(firsts(*voxels), (std::vector<int>{0, 1, -2000, 2, 3}));
   EXPECT_EQ(info_.fill, 32768 - 2000);
@@ -229,7 +236,7 @@ TEST_F(DicomVolume, FramesAreSlicesWithTheirPositions) {
   film.set(0x28, 0x08, "IS", "3").set(0x28, 0x09, "AT", le(0x18, 2) + le(0x1063, 2));
   put("mf.dcm", film.data(sample(1) + sample(2) + sample(3)).bytes());
   expect_refused("3 time steps: expected --time N, from 0 to 2", {}, "mf.dcm");
-  const auto second = open("mf.dcm", {.time = 1});
+  const auto second = open("mf.dcm", with([&](OpenOptions& o) { o.time = 1; }));
   ASSERT_TRUE(second) << second.error().what;
   EXPECT_EQ(firsts(*second), (std::vector<int>{2}));
   put("mf.dcm", File{}.set(0x28, 0x08, "IS", "3").bytes());
@@ -247,7 +254,7 @@ TEST_F(DicomVolume, ScalesThatDifferMakeRealValues) {
                                        .data(sample(100))
                                        .bytes());
   expect_refused("or --apply-scale, which makes real values of them");
-  const auto voxels = open({}, {.real_values = true});
+  const auto voxels = open({}, with([&](OpenOptions& o) { o.real_values = true; }));
   ASSERT_TRUE(voxels) << voxels.error().what;
   EXPECT_EQ(info_.format, VoxelFormat::float32);
   EXPECT_EQ(info_.slope, 1);
@@ -256,7 +263,7 @@ TEST_F(DicomVolume, ScalesThatDifferMakeRealValues) {
     std::memcpy(&value, voxels->data() + 8 * i, 4);
     EXPECT_EQ(value, static_cast<float>(std::stod(fmt::format("{}", 0.1 * (i + 1))) * 100 + i));
   }
-  ASSERT_TRUE(open({}, {.any_part = true}));
+  ASSERT_TRUE(open({}, with([&](OpenOptions& o) { o.any_part = true; })));
 }
 
 TEST_F(DicomVolume, SeriesFoldersAndTimeSteps) {
@@ -277,13 +284,13 @@ TEST_F(DicomVolume, SeriesFoldersAndTimeSteps) {
         "slices, T2)",
         {}, name);
     for (const char* id : {"1", "44", "1.2.44"}) {
-      const auto voxels = open(name, {.series = id});
+      const auto voxels = open(name, with([&](OpenOptions& o) { o.series = id; }));
       ASSERT_TRUE(voxels) << voxels.error().what;
       EXPECT_EQ(firsts(*voxels), (std::vector<int>{10, 11}));
     }
   }
-  expect_refused("--series 7: no such series", {.series = "7"});
-  ASSERT_TRUE(open({}, {.any_part = true}));
+  expect_refused("--series 7: no such series", with([&](OpenOptions& o) { o.series = "7"; }));
+  ASSERT_TRUE(open({}, with([&](OpenOptions& o) { o.any_part = true; })));
   ASSERT_EQ(info_.parts.size(), 1u);
 
   std::filesystem::remove_all(path("a"));
@@ -296,7 +303,7 @@ TEST_F(DicomVolume, SeriesFoldersAndTimeSteps) {
                                          .data(sample(10 * (2 - t) + z))
                                          .bytes());
   expect_refused("2 time steps: expected --time N");
-  const auto voxels = open({}, {.time = 1});
+  const auto voxels = open({}, with([&](OpenOptions& o) { o.time = 1; }));
   ASSERT_TRUE(voxels) << voxels.error().what;
   EXPECT_EQ(firsts(*voxels), (std::vector<int>{20, 21, 22}));
 }
@@ -334,7 +341,7 @@ TEST_F(DicomVolume, ColoursAndPalettes) {
   ASSERT_TRUE(voxels) << voxels.error().what;
   EXPECT_EQ(*voxels, (Bytes{std::byte{0x10}, std::byte{0x20}, std::byte{0x30}, std::byte{255}, std::byte{255},
                             std::byte{255}}));
-  voxels = open({}, {.labels = true});
+  voxels = open({}, with([&](OpenOptions& o) { o.labels = true; }));
   ASSERT_TRUE(voxels) << voxels.error().what;
   EXPECT_TRUE(info_.is_labels);
   EXPECT_EQ(*voxels, (Bytes{std::byte{5}, std::byte{6}}));

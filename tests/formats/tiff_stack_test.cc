@@ -14,6 +14,13 @@
 namespace voxkit {
 namespace {
 
+template <class Set>
+OpenOptions with(const Set& set) {
+  OpenOptions options;
+  set(options);
+  return options;
+}
+
 std::string text_of(const Bytes& bytes) {
   return {reinterpret_cast<const char*>(bytes.data()), bytes.size()};
 }
@@ -119,7 +126,7 @@ TEST_F(TiffStack, ImagesAfterOneDirectoryAreAllRead) {
   EXPECT_EQ(info_.dims, Index3(2, 2, 3));
   EXPECT_EQ(values_of<uint16_t>(*voxels), (std::vector<uint16_t>{1, 2, 3, 4, 5, 6, 7, 8, 9, 10, 11, 12}));
   tiff.pages[0].texts[270] = "ImageJ=1.53t\nimages=3\nchannels=3\n";
-  ASSERT_TRUE(read_file(tiff.bytes(), {.channel = 1}));
+  ASSERT_TRUE(read_file(tiff.bytes(), with([&](OpenOptions& o) { o.channel = 1; })));
   EXPECT_EQ(info_.dims, Index3(2, 2, 1));
   tiff.pages[0].texts[270] = "{\"shape\": [3, 2, 2], \"truncated\": true}";
   ASSERT_TRUE(read_file(tiff.bytes()));
@@ -134,13 +141,20 @@ TEST_F(TiffStack, HyperstacksAskWhichPart) {
   // Channels change fastest, then slices, then time.
   TiffBuilder tiff = pages(12, "ImageJ=1\nimages=12\nchannels=2\nslices=3\nframes=2\nhyperstack=true\n");
   expect_refused(tiff.bytes(), "2 time steps and 2 channels: expected --time N, from 0 to 1 and --channel N");
-  expect_refused(tiff.bytes(), "2 channels: expected --channel N, from 0 to 1", {.time = 0});
+  expect_refused(tiff.bytes(), "2 channels: expected --channel N, from 0 to 1",
+                 with([&](OpenOptions& o) { o.time = 0; }));
   expect_refused(tiff.bytes(), "--channel 2: the file has 2 channels: expected 0 to 1",
-                 {.time = 0, .channel = 2});
-  auto voxels = read_file(tiff.bytes(), {.time = 1, .channel = 1});
+                 with([&](OpenOptions& o) {
+                   o.time = 0;
+                   o.channel = 2;
+                 }));
+  auto voxels = read_file(tiff.bytes(), with([&](OpenOptions& o) {
+                            o.time = 1;
+                            o.channel = 1;
+                          }));
   ASSERT_TRUE(voxels) << voxels.error().what;
   EXPECT_EQ(text_of(*voxels), "h.j.l.");
-  voxels = read_file(tiff.bytes(), {.any_part = true});
+  voxels = read_file(tiff.bytes(), with([&](OpenOptions& o) { o.any_part = true; }));
   ASSERT_TRUE(voxels);
   EXPECT_EQ(text_of(*voxels), "a.c.e.");
   EXPECT_EQ(info_.parts, (std::vector<std::string>{"--time 0 of 0..1", "--channel 0 of 0..1"}));
@@ -148,7 +162,7 @@ TEST_F(TiffStack, HyperstacksAskWhichPart) {
   expect_refused(tiff.bytes(), "are not 12 images");
   tiff.pages[0].texts[270] = "{\"shape\": [3, 4, 1, 2], \"axes\": \"TZYX\"}";
   expect_refused(tiff.bytes(), "3 time steps");
-  voxels = read_file(tiff.bytes(), {.time = 2});
+  voxels = read_file(tiff.bytes(), with([&](OpenOptions& o) { o.time = 2; }));
   ASSERT_TRUE(voxels);
   EXPECT_EQ(text_of(*voxels), "i.j.k.l.");
 }
@@ -165,7 +179,7 @@ TEST_F(TiffStack, OmeSaysOrderAndSize) {
                    "PhysicalSizeY=\"0.25\" PhysicalSizeZ=\"2\"",
                    "<Channel ID=\"0\"/><Channel ID=\"1\"/><TiffData/>"));
   expect_refused(tiff.bytes(), "2 channels: expected --channel N");
-  auto voxels = read_file(tiff.bytes(), {.channel = 1});
+  auto voxels = read_file(tiff.bytes(), with([&](OpenOptions& o) { o.channel = 1; }));
   ASSERT_TRUE(voxels) << voxels.error().what;
   EXPECT_EQ(text_of(*voxels), "d.e.f.");
   EXPECT_EQ(info_.affine.spacing(), (std::array<double, 3>{0.5, 0.25, 2}));
@@ -174,7 +188,7 @@ TEST_F(TiffStack, OmeSaysOrderAndSize) {
       ome("DimensionOrder=\"XYCZT\" SizeZ=\"3\" SizeC=\"2\" SizeT=\"1\" PhysicalSizeX=\"1\" "
           "PhysicalSizeXUnit=\"mm\" PhysicalSizeY=\"500\" PhysicalSizeYUnit=\"&#181;m\"",
           "<TiffData IFD=\"0\" PlaneCount=\"6\"/>");
-  voxels = read_file(tiff.bytes(), {.channel = 1});
+  voxels = read_file(tiff.bytes(), with([&](OpenOptions& o) { o.channel = 1; }));
   ASSERT_TRUE(voxels) << voxels.error().what;
   EXPECT_EQ(text_of(*voxels), "b.d.f.");
   EXPECT_DOUBLE_EQ(info_.affine.spacing()[1], 0.5);
@@ -392,7 +406,7 @@ TEST_F(TiffStack, StripsTilesAndPlanes) {
   ASSERT_TRUE(voxels) << voxels.error().what;
   EXPECT_EQ(info_.format, VoxelFormat::rgb24);
   EXPECT_EQ(text_of(*voxels), "rgbRGB");
-  voxels = read_file(tiff.bytes(), {.channel = 1});
+  voxels = read_file(tiff.bytes(), with([&](OpenOptions& o) { o.channel = 1; }));
   ASSERT_TRUE(voxels) << voxels.error().what;
   EXPECT_EQ(text_of(*voxels), "gG");
   // Grey and alpha are channels.
@@ -426,7 +440,7 @@ TEST_F(TiffStack, PalettesAreGreyOrColoursOrLabels) {
   ASSERT_TRUE(voxels) << voxels.error().what;
   EXPECT_EQ(info_.format, VoxelFormat::rgb24);
   EXPECT_EQ(text_of(*voxels), std::string("\xff\xff\xff\x12\xfe\xfe\0\0\0", 9));
-  voxels = read_file(tiff.bytes(), {.labels = true});
+  voxels = read_file(tiff.bytes(), with([&](OpenOptions& o) { o.labels = true; }));
   ASSERT_TRUE(voxels) << voxels.error().what;
   EXPECT_TRUE(info_.is_labels);
   EXPECT_EQ(text_of(*voxels), std::string("\0\1\xff", 3));

@@ -179,9 +179,21 @@ class Volume:
         self.slope, self.intercept, *self.range = container.unpack("<4d", at + 80)
         self.axes = [[self.spacing[a] if a == b else 0.0 for b in range(3)] for a in range(3)]
         self.world = self.unit = self.base = 0
+        self.fill = None
         self.labels, self.description = None, ""
         if more:
             self.read_more(container)
+
+    def samples(self, voxels):
+        """What voxels stand for where samples are wider than voxels (section 1.5); else the voxels themselves."""
+        if self.sample not in WIDE or self.format not in ("DENSITY8", "DENSITY16"):
+            return voxels
+        size = int(self.sample[1:]) // 8
+        stored = memoryview(bytes(voxels)).cast("B" if self.voxel_bytes == 1 else "H")
+        if self.labels is not None:
+            table = [label % (1 << 8 * size) for label in self.labels]
+            return b"".join(table[min(v, len(table) - 1)].to_bytes(size, "little") for v in stored)
+        return b"".join(((v + self.base) % (1 << 8 * size)).to_bytes(size, "little") for v in stored)
 
     def read_more(self, container):
         """Section 1.5: the chunk VOLX."""
@@ -197,7 +209,9 @@ class Volume:
         a, b, c = self.axes
         volume = sum(a[i] * (b[i - 2] * c[i - 1] - b[i - 1] * c[i - 2]) for i in range(3))
         require(all(map(math.isfinite, numbers)) and volume != 0, "chunk VOLX: byte {}: no axes of a volume", at + 16)
-        self.base, = container.unpack("<q", at + 120)
+        self.fill, self.base = container.unpack("<dq", at + 112)
+        if not flags & 1:
+            self.fill = None
         if count:
             require(self.format in ("DENSITY8", "DENSITY16"), "chunk VOLX: byte {}: labels of {}", at + 8, self.format)
             self.labels = container.unpack(f"<{count}q", at + 136)

@@ -375,7 +375,7 @@ def main():
         return fail(5, options.file, "too large for this program, which holds the whole volume")
     try:
         with open(options.out, "wb") as file:
-            file.write(voxels)
+            file.write(svmm.volume.samples(voxels))
     except OSError as error:
         return fail(4, options.out, error.strerror)
     return 0

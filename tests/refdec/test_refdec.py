@@ -80,7 +80,7 @@ class SmallFile(unittest.TestCase):
 
     def test_container_rules(self):
         chunks = self.chunks()
-        self.refused(container(chunks, version=3), "version 3")
+        self.refused(container(chunks, version=4), "version 4")
         self.refused(container(chunks, codec=3), "codec 3")
         for gone in range(4):
             self.refused(container(chunks[:gone] + chunks[gone + 1:]), "expected exactly one|missing")

@@ -152,7 +152,7 @@ BUILT_INS = ("sphere:33", "noise:23:1", "marschner-lobb:32", "membrane:60,41,13:
              "membrane:3,70,5:3")
 SAMPLE_TYPES = (  # of a .raw file; voxel format, bits of a voxel
     ("u8", "DENSITY8", 8), ("i8", "DENSITY8", 8), ("u16", "DENSITY16", 16), ("i16", "DENSITY16", 16),
-    ("i32", "FLOAT32", 32), ("f32", "FLOAT32", 32), ("bit", "BITMAP", 1))
+    ("i32", "DENSITY16", 32), ("f32", "FLOAT32", 32), ("bit", "BITMAP", 1))
 
 
 @unittest.skipUnless(BIN, "VOXKIT_BIN is not set")

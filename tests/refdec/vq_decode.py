@@ -57,7 +57,11 @@ class Vq:
         require(chunk.length == 128, "chunk VQPM: byte {}: {} bytes, expected 128", at, chunk.length)
         (self.codebook, self.mapping, self.bits, self.seeding, self.iterations, self.count, self.common, self.base,
          self.step, self.max_error, self.unique, self.offset_bytes, self.codebook_bytes,
-         self.widest) = self.container.unpack("<4BIQQ3dQQQI", at)
+         self.widest, special) = self.container.unpack("<4BIQQ3dQQQII", at)
+        require(special <= 1 << self.bits, "chunk VQPM: byte {}: code {} for no value", at + 76, special - 1)
+        require(special == 0 or self.volume.format == "FLOAT32" or self.volume.fill is not None,
+                "chunk VQPM: byte {}: a code for a fill value, and none", at + 76)
+        self.special = special - 1 if special else None
         require(self.codebook in CODEBOOKS, "chunk VQPM: byte {}: codebook {}", at, self.codebook)
         require(self.mapping in MAPPINGS, "chunk VQPM: byte {}: mapping {}", at + 1, self.mapping)
         require(self.mapping == INDIRECT or self.codebook == RBUC,
@@ -166,6 +170,9 @@ class Vq:
 
     def value(self, code):
         """The bytes of the voxel that a code stands for (section 3)."""
+        if code == self.special:
+            return struct.pack("<f", math.nan) if self.volume.format == "FLOAT32" else \
+                int(self.volume.fill).to_bytes(self.volume.voxel_bytes, "little")
         value = self.base + self.step * code
         if self.volume.format == "FLOAT32":
             try:
@@ -292,7 +299,7 @@ def main():
         return fail(5, options.file, "too large for this program, which holds the whole volume")
     try:
         with open(options.out, "wb") as file:
-            file.write(voxels)
+            file.write(vq.volume.samples(voxels))
     except OSError as error:
         return fail(4, options.out, error.strerror)
     return 0
