@@ -56,6 +56,8 @@ Result<std::unique_ptr<const DeviceDvr>> DeviceDvr::upload(const DvrScene& scene
                                                            Context& ctx) {
   const DvrVolume& volume = scene.volume();
   if (volume.svmm()) return bad_usage("--device cuda: an SVMM volume has to be decoded for --mode dvr");
+  if (volume.vq() && volume.vq()->params().special)
+    return bad_usage("--device cuda: a VQ volume with NaN or a fill value has to be decoded for --mode dvr");
   return volume.vq() ? upload_vq(scene, std::move(backend), ctx)
                      : upload_dense(scene, std::move(backend), ctx);
 }

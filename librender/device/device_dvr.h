@@ -13,8 +13,8 @@ namespace voxkit::render {
 class DeviceDvr {
  public:
   /// The scene must live as long. Errors: those of Backend::upload; ErrorCode::limit where an uncompressed
-  /// volume is one voxel thin or has 2^31 voxels; ErrorCode::usage of SVMM volumes, which have to be decoded;
-  /// ErrorCode::input of a damaged file.
+  /// volume is one voxel thin or has 2^31 voxels; ErrorCode::usage of SVMM volumes, and of VQ volumes with a
+  /// code for no value, which have to be decoded; ErrorCode::input of a damaged file.
   static Result<std::unique_ptr<const DeviceDvr>> upload(const DvrScene& scene,
                                                          std::shared_ptr<const Backend> backend,
                                                          Context& ctx);
