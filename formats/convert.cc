@@ -213,7 +213,7 @@ bool fits(const ValueRange& inner, const ValueRange& outer) {
 /// Least and greatest sample value that a volume may have.
 ValueRange possible_values(const VolumeInfo& info) {
   if (info.labels) return {info.sample(0), info.sample(65535)};
-  if (is_colour(info.format) || info.format == VoxelFormat::density8)
+  if (is_color(info.format) || info.format == VoxelFormat::density8)
     return {info.sample(0), info.sample(255)};
   return info.format == VoxelFormat::density16 ? ValueRange{info.sample(0), info.sample(65535)}
                                                : limits(info.sample_type);
@@ -243,7 +243,7 @@ RowFunction special_rows(VoxelFormat from, const TargetType& to) {
       }
     };
   }
-  if (!is_colour(from) || to.format != VoxelFormat::bitmap) return {};
+  if (!is_color(from) || to.format != VoxelFormat::bitmap) return {};
   return [from](const std::byte* in, int64_t count, std::byte* out) {
     const int bytes = voxel_bytes(from);
     for (int64_t i = 0; i < count; ++i, in += bytes)
@@ -291,7 +291,7 @@ Result<TargetType> parse_target_type(std::string_view name) {
 }
 
 bool needs_range(const VolumeInfo& info, const TargetType& type) {
-  if (is_colour(info.format) && type.format == VoxelFormat::rgba32) return false;
+  if (is_color(info.format) && type.format == VoxelFormat::rgba32) return false;
   if (type.format == VoxelFormat::bitmap || type.format == VoxelFormat::float32) return false;
   return !fits(possible_values(info), limits(type.sample_type));
 }
@@ -300,7 +300,7 @@ Result<std::unique_ptr<VolumeSource>> convert_type(std::unique_ptr<VolumeSource>
                                                    const TargetType& type, const ValueRange& range,
                                                    Context& ctx) {
   const VolumeInfo& from = source->info();
-  if (from.format == type.format && (is_colour(from.format) || from.sample_type == type.sample_type))
+  if (from.format == type.format && (is_color(from.format) || from.sample_type == type.sample_type))
     return source;
   VolumeInfo info = from;
   info.format = type.format;
@@ -358,7 +358,7 @@ Result<std::unique_ptr<VolumeSource>> convert_type(std::unique_ptr<VolumeSource>
 
 Result<std::unique_ptr<VolumeSource>> apply_scale(std::unique_ptr<VolumeSource> source, Context& ctx) {
   const VolumeInfo& from = source->info();
-  if (is_colour(from.format))
+  if (is_color(from.format))
     return bad_usage("colours have no slope and intercept: expected a scalar volume");
   VolumeInfo info = from;
   info.format = VoxelFormat::float32;

@@ -287,7 +287,7 @@ Status visit_voxels(VolumeSource& source, const std::function<void(ConstVoxelSpa
 Result<ValueRange> measure_range(VolumeSource& source, Context& ctx) {
   const VolumeInfo& info = source.info();
   const VoxelFormat format = info.format;
-  if (is_colour(format)) return bad_usage("a colour volume has no range of values: expected a scalar volume");
+  if (is_color(format)) return bad_usage("a colour volume has no range of values: expected a scalar volume");
   Extremes total;
   std::mutex mutex;
   VOX_CHECK(visit_voxels(

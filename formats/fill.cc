@@ -100,7 +100,7 @@ struct Ends {
 }  // namespace
 
 std::unique_ptr<VolumeSource> with_fill(std::unique_ptr<VolumeSource> source, double fill) {
-  if (is_colour(source->info().format)) return source;
+  if (is_color(source->info().format)) return source;
   constexpr float nan = std::numeric_limits<float>::quiet_NaN();
   if (source->info().format == VoxelFormat::float32)
     return std::make_unique<ReplacingSource>(std::move(source), static_cast<float>(fill), nan, fill);

@@ -58,7 +58,7 @@ constexpr int voxel_bytes(VoxelFormat f) {
 constexpr int attributes(VoxelFormat f) {
   return f == VoxelFormat::rgba32 ? 4 : f == VoxelFormat::rgb24 ? 3 : 1;
 }
-constexpr bool is_colour(VoxelFormat f) {
+constexpr bool is_color(VoxelFormat f) {
   return attributes(f) > 1;
 }
 /// "RGBA32", "RGB24", "DENSITY8", "DENSITY16", "FLOAT32", "BITMAP".
@@ -193,7 +193,7 @@ struct VolumeInfo {
   }
   /// What was added to samples to store them, where there is no table of labels.
   int64_t bias() const {
-    return is_colour(format)                                        ? 0
+    return is_color(format)                                         ? 0
            : is_wide(sample_type) && format != VoxelFormat::float32 ? -wide_base
                                                                     : storage_bias(sample_type);
   }

@@ -77,7 +77,7 @@ uint16_t container_version_for(const VolumeInfo& info) {
                      info.space_code == 0 && info.description.empty();
   const bool usual = info.wide_base == 0 && !info.labels && !info.is_labels && !info.fill && !info.rounded &&
                      info.sample_type != SampleType::f16 &&
-                     (is_colour(info.format) || scalar_format(info.sample_type) == info.format);
+                     (is_color(info.format) || scalar_format(info.sample_type) == info.format);
   return plain && usual ? 1 : 3;
 }
 
@@ -150,7 +150,7 @@ Result<VolumeInfo> unpack_volume_info(std::span<const std::byte> bytes, std::spa
   info.sample_type = static_cast<SampleType>(type);
   const bool known = type >= 1 && type <= (facts.empty() ? 11 : 12);
   const bool is_density = info.format == VoxelFormat::density8 || info.format == VoxelFormat::density16;
-  if (!known || (!is_colour(info.format) && scalar_format(info.sample_type) != info.format &&
+  if (!known || (!is_color(info.format) && scalar_format(info.sample_type) != info.format &&
                  !(!facts.empty() && is_wide(info.sample_type) && is_density)))
     return bad_input(file, fmt::format("chunk VOLI, byte 25: sample type {} does not go with {}", type,
                                        name(info.format)));

@@ -35,7 +35,7 @@ void visit_errors(const Image& a, const Image& b, int64_t begin, int64_t end, co
 }
 
 struct Sums {
-  double squares = 0, colour_squares = 0, greatest = 0;
+  double squares = 0, color_squares = 0, greatest = 0;
   int64_t differing = 0;
 };
 
@@ -62,11 +62,11 @@ Status check_comparable(const Image& a, const Image& b) {
     const bool real = image.type() == SampleType::f32;
     const bool is_signed = image.type() == SampleType::i8 || image.type() == SampleType::i16;
     return fmt::format(
-        "a {} image of {}", image.colours() == 3 ? "colour" : "grey",
+        "a {} image of {}", image.colors() == 3 ? "colour" : "grey",
         real ? "floats"
              : fmt::format("{}{} bit integers", is_signed ? "signed " : "", 8 * sample_bytes(image.type())));
   };
-  if (a.type() != b.type() || a.colours() != b.colours())
+  if (a.type() != b.type() || a.colors() != b.colors())
     return bad_usage(
         fmt::format("{} cannot be compared with {}: convert one of them first", describe(a), describe(b)));
   return {};
@@ -87,7 +87,7 @@ Result<ImageDiff> diff_images(const Image& a, const Image& b, std::optional<doub
   diff.channels = std::max(a.channels(), b.channels());
   diff.peak = peak ? *peak : a.peak();
 
-  const int colours = a.colours();
+  const int colors = a.colors();
   std::vector<Sums> blocks(static_cast<size_t>((a.pixels() + pixels_at_once - 1) / pixels_at_once));
   VOX_CHECK(for_blocks(a, ctx, [&](int64_t block, int64_t begin, int64_t end) {
     Sums sums;
@@ -96,7 +96,7 @@ Result<ImageDiff> diff_images(const Image& a, const Image& b, std::optional<doub
     bool differs = false;
     visit_errors(a, b, begin, end, [&](int64_t, int c, double error) {
       sums.squares += error * error;
-      if (c < colours) sums.colour_squares += error * error;
+      if (c < colors) sums.color_squares += error * error;
       sums.greatest = std::max(sums.greatest, error);
       if (counts) counts->add(error);
       differs = (c > 0 && differs) || error != 0;
@@ -111,7 +111,7 @@ Result<ImageDiff> diff_images(const Image& a, const Image& b, std::optional<doub
   Sums total;
   for (const Sums& sums : blocks) {
     total.squares += sums.squares;
-    total.colour_squares += sums.colour_squares;
+    total.color_squares += sums.color_squares;
     total.greatest = std::max(total.greatest, sums.greatest);
     total.differing += sums.differing;
   }
@@ -122,8 +122,8 @@ Result<ImageDiff> diff_images(const Image& a, const Image& b, std::optional<doub
   diff.psnr_db = diff.mse == 0 ? infinity : 10 * std::log10(diff.peak * diff.peak / diff.mse);
   diff.max_abs_error = total.greatest;
   diff.differing_pixels = total.differing;
-  if (colours == 3) {
-    const double distance = std::sqrt(total.colour_squares / pixels) * (255 / a.peak());
+  if (colors == 3) {
+    const double distance = std::sqrt(total.color_squares / pixels) * (255 / a.peak());
     diff.grmse = distance / std::sqrt(3.0);
     diff.grmse_distance = distance;
   }

@@ -314,7 +314,7 @@ Result<Ssim> ssim(const Image& a, const Image& b, std::optional<double> peak, Co
 }
 
 Result<Image> luma(const Image& image, Context& ctx) {
-  if (image.colours() == 1) return channel(image, 0, ctx);
+  if (image.colors() == 1) return channel(image, 0, ctx);
   VOX_TRY(Image out, Image::create(image.width(), image.height(), 1, image.type(), ctx));
   const int64_t channels = image.channels();
   VOX_CHECK(for_rows(image.height(), ctx, [&](int64_t y) {

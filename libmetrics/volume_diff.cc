@@ -76,7 +76,7 @@ class Comparison {
 
   void row(const std::byte* a, const std::byte* b, int64_t n, std::byte* errors, Sums& sums,
            const Counter& count) const {
-    if (is_colour(a_)) return colours(a, b, n, errors, sums, count);
+    if (is_color(a_)) return colors(a, b, n, errors, sums, count);
     switch (a_) {
       case VoxelFormat::density16:
         return first<uint16_t>(a, b, n, errors, sums, count);
@@ -187,8 +187,8 @@ class Comparison {
     }
   }
 
-  void colours(const std::byte* a, const std::byte* b, int64_t n, std::byte* errors, Sums& sums,
-               const Counter& count) const {
+  void colors(const std::byte* a, const std::byte* b, int64_t n, std::byte* errors, Sums& sums,
+              const Counter& count) const {
     const int bytes_a = voxel_bytes(a_), bytes_b = voxel_bytes(b_), bytes = std::max(bytes_a, bytes_b);
     uint64_t squares = 0, rgb_squares = 0, absolute = 0, signal = 0, differing = 0, farthest = 0;
     int greatest = 0;
@@ -261,10 +261,10 @@ VolumeDiff summarise(const Sums& sums, const VolumeInfo& a, int channels, std::o
   diff.snr_db =
       decibels((static_cast<double>(sums.whole.signal) + sums.real.signal) / samples_count, diff.mse);
   diff.max_abs_error = sums.greatest;
-  diff.max_distance = is_colour(a.format) ? std::sqrt(static_cast<double>(sums.farthest)) : sums.greatest;
+  diff.max_distance = is_color(a.format) ? std::sqrt(static_cast<double>(sums.farthest)) : sums.greatest;
   diff.mean_abs_error = (static_cast<double>(sums.whole.absolute) + sums.real.absolute) / samples_count;
   diff.differing_voxels = sums.differing;
-  if (is_colour(a.format)) {
+  if (is_color(a.format)) {
     const double rgb = static_cast<double>(sums.whole.rgb_squares);
     diff.grmse = std::sqrt(rgb / (3 * voxels));
     diff.grmse_distance = std::sqrt(rgb / voxels);
@@ -310,7 +310,7 @@ VolumeInfo error_volume_info(const VolumeInfo& a, const VolumeInfo& b) {
   info.labels.reset();
   info.wide_base = 0;
   info.is_labels = false;
-  if (is_colour(a.format)) {
+  if (is_color(a.format)) {
     if (b.format == VoxelFormat::rgba32) info.format = b.format;
     return info;
   }
@@ -340,7 +340,7 @@ Result<VolumeDiff> diff_volumes(VolumeSource& a, VolumeSource& b, std::optional<
     return bad_usage(fmt::format("the volumes have {},{},{} and {},{},{} voxels: expected the same extent",
                                  p.x, p.y, p.z, q.x, q.y, q.z));
   }
-  if (is_colour(info.format) != is_colour(b.info().format))
+  if (is_color(info.format) != is_color(b.info().format))
     return bad_usage(fmt::format("{} cannot be compared with {}: convert one of them first",
                                  name(info.format), name(b.info().format)));
 

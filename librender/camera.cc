@@ -6,6 +6,7 @@
 #include <cmath>
 #include <cstdlib>
 #include <glm/geometric.hpp>
+#include <glm/matrix.hpp>
 #include <numbers>
 
 namespace voxkit::render {
@@ -93,17 +94,29 @@ Result<std::vector<Camera>> camera_path(const std::string& name, const Camera& c
   return bad_usage(fmt::format("--path \"{}\": expected thesis94, orbit:N or FILE.json", name));
 }
 
-GridTransform::GridTransform(const VolumeInfo& info) {
+GridTransform::GridTransform(const VolumeInfo& info) : axes(1.0), along(1.0) {
   glm::dvec3 size;
-  const Affine::Vector spacing = info.affine.spacing();
+  const Affine affine =
+      is_anatomical(info.world) ? in_world(info.affine, info.world, World::ras) : info.affine;
+  const Affine::Vector spacing = affine.spacing();
+  const bool turned = affine.is_valid() && !affine.is_plain();
   for (int a = 0; a < 3; ++a) {
-    const double edge = spacing[static_cast<size_t>(a)];
+    const auto i = static_cast<size_t>(a);
+    const double edge = spacing[i];
     voxel[a] = edge > 0 ? edge : 1;
     size[a] = voxel[a] * static_cast<double>(info.dims[a]);
+    if (turned) axes[a] = glm::dvec3(affine.axes[i][0], affine.axes[i][1], affine.axes[i][2]) / voxel[a];
   }
+  if (turned) along = glm::inverse(axes);
   const double longest = std::max({size.x, size.y, size.z});
   half = size / longest * 0.5;
   voxel /= longest;
+}
+
+double GridTransform::radius() const {
+  double radius = 0;
+  for (int i = 0; i < 8; ++i) radius = std::max(radius, glm::length(corner(i)));
+  return radius;
 }
 
 RayGenerator::RayGenerator(const Camera& camera, int width, int height)

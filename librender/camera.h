@@ -1,7 +1,9 @@
-// Cameras and camera paths (thesis sections 3.2.1 and 4.2). The volume is a box centred at the origin whose
-// longest side is 1.
+// Cameras and camera paths (thesis sections 3.2.1 and 4.2). The volume is centred at the origin, its longest
+// side is 1, and its axes point where its affine says: a mirrored volume is seen mirrored, a sheared one
+// sheared.
 #pragma once
 
+#include <glm/mat3x3.hpp>
 #include <glm/vec3.hpp>
 #include <string>
 #include <vector>
@@ -34,13 +36,21 @@ Result<Camera> parse_camera(const std::string& text, double fov);
 /// as in section 4.2; "orbit:N": N frames of one full turn. The camera gives elevation and field of view.
 Result<std::vector<Camera>> camera_path(const std::string& name, const Camera& camera);
 
-/// From world to grid coordinates of a volume: grid = (world + half) / voxel, half the box's half size, voxel
-/// the edges of a voxel.
+/// From world to grid coordinates of a volume: grid = (along * world + half) / voxel, half the volume's half
+/// size and voxel the edges of a voxel, both along its axes. Volumes of patients are drawn in RAS.
 struct GridTransform {
   explicit GridTransform(const VolumeInfo& info);
   glm::dvec3 half, voxel;
-  glm::dvec3 point(const glm::dvec3& world) const { return (world + half) / voxel; }
-  glm::dvec3 direction(const glm::dvec3& world) const { return world / voxel; }
+  glm::dmat3 axes;   ///< columns: unit vectors of the volume's axes, world
+  glm::dmat3 along;  ///< their inverse: exactly the identity where axes are those of the world
+  glm::dvec3 point(const glm::dvec3& world) const { return (along * world + half) / voxel; }
+  glm::dvec3 direction(const glm::dvec3& world) const { return along * world / voxel; }
+  /// Corner 0..7; bits x, y and z say on which side of the middle.
+  glm::dvec3 corner(int i) const {
+    return axes * glm::dvec3((i & 1 ? 1 : -1) * half.x, (i & 2 ? 1 : -1) * half.y, (i & 4 ? 1 : -1) * half.z);
+  }
+  /// From the middle to the farthest corner, world.
+  double radius() const;
   double smallest_edge() const { return std::min({voxel.x, voxel.y, voxel.z}); }
   double largest_edge() const { return std::max({voxel.x, voxel.y, voxel.z}); }
 };

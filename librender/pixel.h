@@ -9,7 +9,7 @@ namespace voxkit::render {
 
 /// What a ray found.
 struct Pixel {
-  float colour[4] = {};               ///< R, G, B times opacity, and opacity; 0..1
+  float color[4] = {};                ///< R, G, B times opacity, and opacity; 0..1
   float distance = __builtin_inff();  ///< from the eye to the first voxel that is not void, world units
 };
 /// More about it.
@@ -22,16 +22,16 @@ struct PixelCost {
   uint32_t blocks, bytes;
 };
 
-struct Colour {
+struct Color {
   float rgb[3], alpha;
 };
 
 /// The colour and opacity of a voxel. RGBA32: its own. RGB24: opaque, black is void. Scalars: d from 0 to 1
 /// over a range, the colour being (d, d, d) and the opacity d (thesis section 4.1); NaN is void.
-class ColourOf {
+class ColorOf {
  public:
   /// `range`: stored values of a scalar volume; BITMAP: 0 and 1, whatever it says.
-  VOX_HD_HOT ColourOf(VoxelFormat format, const ValueRange& range)
+  VOX_HD_HOT ColorOf(VoxelFormat format, const ValueRange& range)
       : format_(format),
         lo_(format == VoxelFormat::bitmap ? 0 : range.lo),
         scale_(format == VoxelFormat::bitmap ? 1
@@ -40,11 +40,11 @@ class ColourOf {
         void_shift_(format == VoxelFormat::rgba32 ? 24 : 0),
         void_most_(0) {
     // Of integers those up to lo are void: all or none where that is beyond them.
-    if (!is_colour(format))
+    if (!is_color(format))
       void_most_ = scale_ <= 0 || lo_ >= 65535 ? 65535 : lo_ < 0 ? -1 : static_cast<int64_t>(lo_);
   }
 
-  VOX_HD_HOT Colour operator()(const Voxel& v) const {
+  VOX_HD_HOT Color operator()(const Voxel& v) const {
     const auto byte = [bits = v.as<uint32_t>()](int k) {
       return static_cast<float>(static_cast<double>(bits >> (8 * k) & 255u) * (1.0 / 255));
     };
@@ -66,7 +66,7 @@ class ColourOf {
   }
 
  private:
-  VOX_HD_HOT Colour grey(double value) const {
+  VOX_HD_HOT Color grey(double value) const {
     const double x = (value - lo_) * scale_;
     const float d = static_cast<float>(x > 0 ? (x < 1 ? x : 1) : 0);
     return {{d, d, d}, d};

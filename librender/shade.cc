@@ -91,8 +91,8 @@ Result<Picture> shade(const Frame& frame, const Camera& camera, double voxel, co
       if (openness) diffuse *= openness->row(y)[x];
       float* out = picture.row(y) + 4 * x;
       for (int k = 0; k < 3; ++k)
-        out[k] = std::clamp(pixel.colour[k] * diffuse + specular * pixel.colour[3] +
-                                (1 - pixel.colour[3]) * options.background[k],
+        out[k] = std::clamp(pixel.color[k] * diffuse + specular * pixel.color[3] +
+                                (1 - pixel.color[3]) * options.background[k],
                             0.0f, 1.0f);
       out[3] = 1;
     }

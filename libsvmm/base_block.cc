@@ -61,10 +61,10 @@ int luma(const std::byte* rgb) {
   return (13933 * u8(rgb[0]) + 46871 * u8(rgb[1]) + 4732 * u8(rgb[2]) + 32768) >> 16;
 }
 
-using Palette = std::array<Bc1Colour, 4>;
+using Palette = std::array<Bc1Color, 4>;
 
 Palette bc1_palette(unsigned c0, unsigned c1) {
-  return {bc1_colour(c0, c1, 0), bc1_colour(c0, c1, 1), bc1_colour(c0, c1, 2), bc1_colour(c0, c1, 3)};
+  return {bc1_color(c0, c1, 0), bc1_color(c0, c1, 1), bc1_color(c0, c1, 2), bc1_color(c0, c1, 3)};
 }
 
 /// `rgba`: 16 pixels, alpha 0 = void.
@@ -127,7 +127,7 @@ void for_each_tile_pixel(Index3 size, Visit visit) {
         for (int i = 0; i < 16; ++i) visit(tile, i, voxel_index({x + i % 4, y + i / 4, z}, size));
 }
 
-bool colour_from_parent(Index3 size) {
+bool color_from_parent(Index3 size) {
   return size == Index3(2);
 }
 
@@ -161,7 +161,7 @@ void encode_base_block(const std::byte* voxels, Index3 size, VoxelFormat f, Base
     out.insert(out.end(), voxels, voxels + count * stride);
     return;
   }
-  const int w = colour_from_parent(size) ? 2 : 4;  // only "2 or more" matters here
+  const int w = color_from_parent(size) ? 2 : 4;  // only "2 or more" matters here
   out.resize(start + base_block_bytes(static_cast<uint64_t>(count), w, f, base, layout));
   std::byte* p = &out[start];
   if (base == Base::raw && f != VoxelFormat::bitmap) {
@@ -187,7 +187,7 @@ void encode_base_block(const std::byte* voxels, Index3 size, VoxelFormat f, Base
       const std::byte* v = voxels + s * 8 * stride;
       unsigned occupancy = 0;
       for (int i = 0; i < 8; ++i) occupancy |= static_cast<unsigned>(occupied(v + i * stride, f)) << i;
-      if (!colour_from_parent(size) && f != VoxelFormat::bitmap) {
+      if (!color_from_parent(size) && f != VoxelFormat::bitmap) {
         shared_mean(v, f, occupancy, p);
         p += shared_bytes(f);
       }
@@ -240,7 +240,7 @@ void decode_base_block(const std::byte* block, Index3 size, VoxelFormat f, Base 
   } else {
     for (int64_t s = 0; s < count / 8; ++s) {
       const std::byte* shared = parent.bytes.data();
-      if (!colour_from_parent(size)) shared = block, block += shared_bytes(f);
+      if (!color_from_parent(size)) shared = block, block += shared_bytes(f);
       for (int i = 0; i < 8; ++i) {
         std::byte* v = voxels + (s * 8 + i) * stride;
         const int alpha = base == Base::alpha ? u8(block[i]) : (u8(*block) >> i & 1) * 255;

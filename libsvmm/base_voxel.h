@@ -7,23 +7,23 @@ namespace voxkit::svmm {
 
 /// Bytes of the value that the voxels of a subblock share.
 constexpr int shared_bytes(VoxelFormat f) {
-  return is_colour(f) ? 3 : voxel_bytes(f);
+  return is_color(f) ? 3 : voxel_bytes(f);
 }
 
 /// S3TC (BC1, "DXT1"): 4x4 pixels in 8 bytes: two RGB565 end points and sixteen 2-bit indices. If the first
 /// end point is greater as a number there are four opaque colours; else three, and index 3 is void.
-struct Bc1Colour {
+struct Bc1Color {
   int rgb[3];
 };
-VOX_HD inline Bc1Colour expand_565(unsigned c) {
+VOX_HD inline Bc1Color expand_565(unsigned c) {
   const int r = static_cast<int>(c >> 11 & 31), g = static_cast<int>(c >> 5 & 63),
             b = static_cast<int>(c & 31);
   return {{r << 3 | r >> 2, g << 2 | g >> 4, b << 3 | b >> 2}};
 }
-VOX_HD inline Bc1Colour bc1_colour(unsigned c0, unsigned c1, unsigned index) {
-  const Bc1Colour a = expand_565(c0), b = expand_565(c1);
+VOX_HD inline Bc1Color bc1_color(unsigned c0, unsigned c1, unsigned index) {
+  const Bc1Color a = expand_565(c0), b = expand_565(c1);
   if (index < 2) return index == 0 ? a : b;
-  Bc1Colour mixed{};
+  Bc1Color mixed{};
   for (int k = 0; k < 3; ++k)
     mixed.rgb[k] = c0 > c1      ? (index == 2 ? 2 * a.rgb[k] + b.rgb[k] : a.rgb[k] + 2 * b.rgb[k]) / 3
                    : index == 2 ? (a.rgb[k] + b.rgb[k]) / 2
@@ -38,7 +38,7 @@ VOX_HD inline Voxel decode_base_voxel(const std::byte* block, Index3 size, Index
   const int64_t index = voxel_index(v, size), subblock = index / 8;
   const int i = static_cast<int>(index % 8);
   const auto u8 = [](std::byte b) { return static_cast<int>(b); };
-  const auto colour = [f](int r, int g, int b, int alpha) {
+  const auto color = [f](int r, int g, int b, int alpha) {
     const int a = f == VoxelFormat::rgba32 ? alpha : 0;
     return Voxel::of(static_cast<uint32_t>(r | g << 8 | b << 16) | static_cast<uint32_t>(a) << 24);
   };
@@ -55,15 +55,15 @@ VOX_HD inline Voxel decode_base_voxel(const std::byte* block, Index3 size, Index
   if (base == Base::raw) return thesis_value(load_word(block + index * word_bytes(f), f), f);
   if (base == Base::gray) {
     const int l = u8(block[index]);
-    return l != 0 ? colour(l, l, l, 255) : Voxel{};
+    return l != 0 ? color(l, l, l, 255) : Voxel{};
   }
   if (base == Base::bc1) {
     const std::byte* p = block + ((v.z * (size.y / 4) + v.y / 4) * (size.x / 4) + v.x / 4) * 8;
     const unsigned c0 = load_le<uint16_t>(p), c1 = load_le<uint16_t>(p + 2);
     const unsigned pixel = load_le<uint32_t>(p + 4) >> (2 * (v.y % 4 * 4 + v.x % 4)) & 3;
     if (c0 <= c1 && pixel == 3) return {};
-    const Bc1Colour c = bc1_colour(c0, c1, pixel);
-    return colour(c.rgb[0], c.rgb[1], c.rgb[2], 255);
+    const Bc1Color c = bc1_color(c0, c1, pixel);
+    return color(c.rgb[0], c.rgb[1], c.rgb[2], 255);
   }
   // bitmap and alpha: of a block of 2^3 the colour is its parent's
   const int shared = size == Index3(2) ? 0 : shared_bytes(f);

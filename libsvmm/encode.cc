@@ -115,7 +115,7 @@ class Encoder {
         levels_(plan_levels(info_, params)),
         reservation_(*ctx.memory) {
     if (levels_.size() == 1) params_.base = Base::raw;
-    if (info_.fill && F != VoxelFormat::float32 && !is_colour(F))
+    if (info_.fill && F != VoxelFormat::float32 && !is_color(F))
       criterion_.fill = static_cast<int64_t>(*info_.fill);
     for (uint32_t k = 0; k < levels_.size(); ++k) writers_.emplace_back(container_, k, levels_[k]);
   }

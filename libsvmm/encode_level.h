@@ -205,7 +205,7 @@ void encode_base_block(const ConstVoxelSpan& voxels, const Index3& valid, int w,
   parent.moments = moments;
   parent.value = value;
   bool homogeneous = moments.within(value, criterion);
-  if (!homogeneous && is_colour(F))  // the box of values is too wide, but perhaps no voxel is in its corner
+  if (!homogeneous && is_color(F))  // the box of values is too wide, but perhaps no voxel is in its corner
     homogeneous = every([&](const std::byte* v) { return Moments<F>::near(v, value, criterion); });
   parent.terminal = homogeneous;
   if (homogeneous) return;

@@ -45,12 +45,12 @@ Status validate(const Params& params, const VolumeInfo& info) {
     return bad_usage(fmt::format("--delta {}: expected a number from 0", params.delta));
   if (!(params.full_scale > 0) || !std::isfinite(params.full_scale))
     return bad_usage(fmt::format("full scale {}: expected a number above 0", params.full_scale));
-  if (params.layout == Layout::thesis && !is_colour(f) && f != VoxelFormat::density8)
+  if (params.layout == Layout::thesis && !is_color(f) && f != VoxelFormat::density8)
     return bad_usage(fmt::format(
         "--layout thesis: {} has no published layout: expected RGBA32, RGB24 or DENSITY8", name(f)));
   if (params.base == Base::alpha && f != VoxelFormat::rgba32)
     return bad_usage(fmt::format("--base alpha: {} has no alpha: expected RGBA32", name(f)));
-  if ((params.base == Base::gray || params.base == Base::bc1) && !is_colour(f))
+  if ((params.base == Base::gray || params.base == Base::bc1) && !is_color(f))
     return bad_usage(fmt::format("--base {}: {} has no colour: expected RGBA32 or RGB24",
                                  params.base == Base::gray ? "gray" : "bc1", name(f)));
   if (params.base == Base::bc1 && blockwidth(params, 0) < 4)

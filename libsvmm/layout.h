@@ -42,7 +42,7 @@ constexpr int value_bytes(VoxelFormat f) {
 }
 /// Bytes of a structural word in layout thesis.
 constexpr int word_bytes(VoxelFormat f) {
-  return is_colour(f) ? 4 : 2;
+  return is_color(f) ? 4 : 2;
 }
 
 /// The children of a subblock: which of its voxels are not terminal, and the index of the first one's block
@@ -93,10 +93,10 @@ VOX_HD inline Voxel thesis_value(uint32_t word, VoxelFormat f) {
   return v;
 }
 VOX_HD inline uint32_t load_word(const std::byte* p, VoxelFormat f) {
-  return is_colour(f) ? load_aligned_le<uint32_t>(p) : load_aligned_le<uint16_t>(p);
+  return is_color(f) ? load_aligned_le<uint32_t>(p) : load_aligned_le<uint16_t>(p);
 }
 inline void store_word(std::byte* p, VoxelFormat f, uint32_t word) {
-  is_colour(f) ? store_le(p, word) : store_le(p, static_cast<uint16_t>(word));
+  is_color(f) ? store_le(p, word) : store_le(p, static_cast<uint16_t>(word));
 }
 
 /// Bytes of the values of a subblock, layout plain; the links of a block follow those of all.

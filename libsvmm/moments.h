@@ -18,7 +18,7 @@ namespace voxkit::svmm {
 struct Criterion {
   Criterion(const Params& params, VoxelFormat f) {
     // The thesis expands a density d to (d, d, d, d), whose distances are twice as large.
-    const double spread = params.layout == Layout::thesis && !is_colour(f) ? 2 : 1;
+    const double spread = params.layout == Layout::thesis && !is_color(f) ? 2 : 1;
     distance = params.delta * params.full_scale / spread;
     squared = static_cast<int64_t>(std::min(std::floor(distance * distance), 4.0 * 255 * 255));
     scalar = static_cast<int64_t>(std::min(std::floor(distance), 65535.0));
@@ -46,7 +46,7 @@ struct Moments;
 
 /// RGBA32 and RGB24.
 template <VoxelFormat F>
-requires(is_colour(F)) struct Moments<F> {
+requires(is_color(F)) struct Moments<F> {
   static constexpr int channels = attributes(F);
   uint64_t count = 0;
   uint64_t sum[3] = {};  ///< of the colours, each times its alpha if alpha_weight

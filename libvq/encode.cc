@@ -213,7 +213,7 @@ class Writer {
 }  // namespace
 
 Status validate(const Options& options, const VolumeInfo& info) {
-  if (is_colour(info.format))
+  if (is_color(info.format))
     return bad_input({}, fmt::format("{} voxels: expected a scalar volume", name(info.format)));
   if (options.codebook == Codebook::packed && options.mapping == Mapping::direct)
     return bad_usage("--offsets direct: bricks of equal size have no addresses: use --codebook rbuc");

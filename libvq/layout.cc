@@ -42,7 +42,7 @@ Result<ParamsAndView> unpack_params(std::span<const std::byte> bytes, const Volu
     return bad_input(file, fmt::format("chunk VQPM, byte {}: {}", at, what));
   };
   if (bytes.size() != params_bytes) return bad(bytes.size(), "ends here: expected 128 bytes");
-  if (is_colour(info.format))
+  if (is_color(info.format))
     return bad_input(
         file, fmt::format("chunk VOLI, byte 24: voxel format {}: expected a scalar one", name(info.format)));
   const auto field = [&](size_t at) { return std::to_integer<int>(bytes[at]); };

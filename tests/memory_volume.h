@@ -97,7 +97,7 @@ inline VolumeInfo scalar_info(Index3 dims, SampleType type) {
   info.format = scalar_format(type);
   return info;
 }
-inline VolumeInfo colour_info(Index3 dims, VoxelFormat format) {
+inline VolumeInfo color_info(Index3 dims, VoxelFormat format) {
   VolumeInfo info;
   info.dims = dims;
   info.format = format;

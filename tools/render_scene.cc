@@ -19,7 +19,7 @@ tl::unexpected<Error> named(Error error, const std::string& name) {
 
 /// For direct volume rendering: from the compressed form where there is one.
 Result<std::shared_ptr<const DvrVolume>> open_volume(Input& input, bool device, Run& run) {
-  if (is_colour(input.source->info().format))
+  if (is_color(input.source->info().format))
     return bad_input({}, fmt::format("voxels are {}: expected a scalar volume for --mode dvr",
                                      voxkit::name(input.source->info().format)));
   const auto opened = [&]() -> Result<DvrVolume> {

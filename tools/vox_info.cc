@@ -69,7 +69,7 @@ Json json_of(const Options& o, const Run& run, const Input& input, std::optional
   json.set("tool", run.tool).set("version", version_text()).set("input", o.file);
   json.set("format", format_of(o.file, input)).set("codec", codec_of(input));
   json.set("dims", info.dims).set("voxel_format", voxkit::name(info.format));
-  if (!is_colour(info.format)) json.set("sample_type", voxkit::name(info.sample_type));
+  if (!is_color(info.format)) json.set("sample_type", voxkit::name(info.sample_type));
   json.set("raw_bytes", raw_bytes(info));
   if (bytes) {
     json.set("file_bytes", *bytes);
@@ -161,7 +161,7 @@ std::string text_of(const Options& o, const Input& input, std::optional<uint64_t
   std::string text = fmt::format("{}: {}\n", o.file, format_of(o.file, input));
   text += fmt::format("voxels      {} x {} x {} {}", info.dims.x, info.dims.y, info.dims.z,
                       voxkit::name(info.format));
-  text += is_colour(info.format) ? "\n" : fmt::format(" ({})\n", voxkit::name(info.sample_type));
+  text += is_color(info.format) ? "\n" : fmt::format(" ({})\n", voxkit::name(info.sample_type));
   text += place_text(info);
   if (info.slope != 1 || info.intercept != 0)
     text += fmt::format("real value  {:.6g} * sample + {:.6g}\n", info.slope, info.intercept);

@@ -9,7 +9,7 @@
 #include "formats/image/image.h"
 #include "formats/names.h"
 #include "formats/volume/open_volume.h"
-#include "libmetrics/colour_distance.h"
+#include "libmetrics/color_distance.h"
 #include "libmetrics/image_diff.h"
 #include "libmetrics/ssim.h"
 #include "libmetrics/volume_diff.h"
@@ -167,7 +167,7 @@ Result<ImageResult> measure(const Image& a, const Image& b, const Options& o, Ru
     VOX_TRY(result.ssim, ssim(luma_a, luma_b, o.peak, run.ctx));
   }
   // Four times the work, so only where it is shown.
-  for (int c = 0; run.options.json && a.colours() > 1 && c < std::min(a.channels(), b.channels()); ++c) {
+  for (int c = 0; run.options.json && a.colors() > 1 && c < std::min(a.channels(), b.channels()); ++c) {
     VOX_TRY(const Image channel_a, channel(a, c, run.ctx));
     VOX_TRY(const Image channel_b, channel(b, c, run.ctx));
     VOX_TRY(const Ssim one, ssim(channel_a, channel_b, o.peak, run.ctx));

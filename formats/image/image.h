@@ -24,7 +24,7 @@ class Image {
   int64_t pixels() const { return width_ * height_; }
   int channels() const { return channels_; }
   /// Channels without alpha: 1 or 3.
-  int colours() const { return channels_ > 2 ? 3 : 1; }
+  int colors() const { return channels_ > 2 ? 3 : 1; }
   /// What the samples are in a file.
   SampleType type() const { return type_; }
   /// Nominal greatest difference of two samples: 255, 65535, or 1 for floats.

@@ -108,12 +108,12 @@ void from_floats(const float* in, SampleType type, int64_t count, std::byte* out
 std::pair<int, int> picture_channels(const ImageSpec& spec, std::string_view format) {
   const auto& names = spec.channelnames;
   if (format != "openexr") return {0, spec.nchannels};
-  for (const std::vector<std::string>& colours : {std::vector<std::string>{"R", "G", "B"}, {"Y"}}) {
-    const auto first = std::search(names.begin(), names.end(), colours.begin(), colours.end());
+  for (const std::vector<std::string>& colors : {std::vector<std::string>{"R", "G", "B"}, {"Y"}}) {
+    const auto first = std::search(names.begin(), names.end(), colors.begin(), colors.end());
     if (first == names.end()) continue;
-    const auto next = first + static_cast<ptrdiff_t>(colours.size());
+    const auto next = first + static_cast<ptrdiff_t>(colors.size());
     return {static_cast<int>(first - names.begin()),
-            static_cast<int>(colours.size()) + (next != names.end() && *next == "A")};
+            static_cast<int>(colors.size()) + (next != names.end() && *next == "A")};
   }
   return {0, spec.nchannels};
 }

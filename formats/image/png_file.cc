@@ -57,24 +57,24 @@ bool read_head(State& state, PngHead& head) {
 }
 
 void read_facts(State& state, PngHead& head) {
-  png_colorp colours = nullptr;
+  png_colorp colors = nullptr;
   png_bytep alphas = nullptr;
-  int colour_count = 0, alpha_count = 0;
+  int color_count = 0, alpha_count = 0;
   png_color_16p value = nullptr;
   const bool transparent = png_get_tRNS(state.png, state.info, &alphas, &alpha_count, &value) != 0;
   if (png_get_color_type(state.png, state.info) == PNG_COLOR_TYPE_PALETTE &&
-      png_get_PLTE(state.png, state.info, &colours, &colour_count) != 0) {
+      png_get_PLTE(state.png, state.info, &colors, &color_count) != 0) {
     head.palette.assign(256, {0, 0, 0, 255});  // indices may lead past a short one
-    for (int i = 0; i < colour_count && i < 256; ++i) {
+    for (int i = 0; i < color_count && i < 256; ++i) {
       const uint8_t alpha = transparent && i < alpha_count ? alphas[i] : 255;
-      head.palette[static_cast<size_t>(i)] = {colours[i].red, colours[i].green, colours[i].blue, alpha};
+      head.palette[static_cast<size_t>(i)] = {colors[i].red, colors[i].green, colors[i].blue, alpha};
       head.translucent |= alpha != 255;
     }
   } else {
     head.transparent_value = transparent && value;
     if (transparent && value && head.bits == 8)
-      head.void_colour = {static_cast<uint8_t>(value->red), static_cast<uint8_t>(value->green),
-                          static_cast<uint8_t>(value->blue)};
+      head.void_color = {static_cast<uint8_t>(value->red), static_cast<uint8_t>(value->green),
+                         static_cast<uint8_t>(value->blue)};
   }
   png_uint_32 x = 0, y = 0;
   int unit = 0;

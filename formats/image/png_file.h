@@ -18,7 +18,7 @@ struct PngHead {
   std::vector<std::array<uint8_t, 4>> palette;       ///< RGBA; empty: pixels are no indices
   bool translucent = false;                          ///< some entry of the palette has alpha
   bool transparent_value = false;                    ///< one value, or colour, stands for void
-  std::array<uint8_t, 3> void_colour{};              ///< that colour, of 8 bits
+  std::array<uint8_t, 3> void_color{};               ///< that colour, of 8 bits
   std::optional<std::array<uint32_t, 2>> per_metre;  ///< pixels along x and y
   std::optional<std::array<uint32_t, 2>> per_unit;   ///< the same, of a unit that is not said
 };

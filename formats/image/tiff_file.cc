@@ -131,7 +131,7 @@ bool TiffFile::read_entry(uint64_t at, bool big, TiffPage& page) const {
       page.predictor = limited<int>(first);
       break;
     case 320:
-      page.colours = field;
+      page.colors = field;
       break;
     case 322:
       page.tiled = true;

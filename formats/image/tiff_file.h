@@ -33,7 +33,7 @@ struct TiffPage {
   std::optional<int> extra;  ///< of the first of the samples that are not colours: 1 associated alpha, 2 not
   bool has_photometric = false;
   TiffField offsets, counts;  ///< of strips or tiles
-  TiffField colours, description;
+  TiffField colors, description;
   std::optional<std::array<uint32_t, 2>> x_resolution, y_resolution;  ///< pixels: numerator, denominator
   int resolution_unit = 2;                                            ///< 1 none, 2 inch, 3 centimetre
   bool imagej_metadata = false;

@@ -93,7 +93,7 @@ class DracoHead {
 Result<DracoMesh> decode_mesh(std::span<const std::byte> bytes, std::span<const DracoAttribute> attributes,
                               uint64_t points, uint64_t triangles, Context& ctx) {
   VOX_CHECK(DracoHead(bytes).check(triangles));
-  // Seen: 170 bytes a triangle with positions, normals and texture coordinates.
+  // Seen: 170 bytes a triangle with positions, normals and picture coordinates.
   VOX_TRY(const Reservation memory,
           Reservation::take(256 * (triangles + points), "unpacking Draco data", ctx));
   draco::DecoderBuffer buffer;

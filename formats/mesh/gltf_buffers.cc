@@ -91,7 +91,7 @@ Result<const Buffers::Loaded*> Buffers::buffer(uint32_t index) {
       loaded.bytes = *owned;
       loaded.owner = owned;
     } else {
-      const std::string file = find_texture(std::filesystem::path(path_).parent_path().string(), *buffer.uri);
+      const std::string file = find_picture(std::filesystem::path(path_).parent_path().string(), *buffer.uri);
       if (file.empty())
         return bad_input(path_, fmt::format("{} is missing, which the mesh needs",
                                             buffer.uri->substr(buffer.uri->rfind('/') + 1, 200)));
@@ -204,9 +204,9 @@ Result<Values<uint32_t>> Buffers::integers(uint32_t index) {
   return out;
 }
 
-Result<TextureReference> Buffers::image(uint32_t index) {
+Result<PictureReference> Buffers::image(uint32_t index) {
   const Image& image = document_.images[index];
-  TextureReference out;
+  PictureReference out;
   if (image.view != none) {
     VOX_TRY(const Loaded* const loaded, load_view(image.view));
     out.bytes = loaded->bytes;

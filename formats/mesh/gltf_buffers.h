@@ -34,7 +34,7 @@ class Buffers {
   Result<Values<uint32_t>> integers(uint32_t accessor);
 
   /// A picture of the file; its bytes stay as long as what is returned.
-  Result<TextureReference> image(uint32_t index);
+  Result<PictureReference> image(uint32_t index);
 
  private:
   struct Loaded {

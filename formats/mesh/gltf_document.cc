@@ -35,7 +35,7 @@ class Reader {
     VOX_CHECK(read_views());
     VOX_CHECK(read_accessors());
     VOX_CHECK(read_images());
-    VOX_CHECK(read_textures(file_, path_, out_));
+    VOX_CHECK(read_pictures(file_, path_, out_));
     VOX_CHECK(read_materials(file_, path_, out_));
     VOX_CHECK(read_meshes());
     VOX_CHECK(read_nodes());

@@ -70,21 +70,21 @@ struct Image {
   uint32_t view = none;
 };
 struct Sampler {
-  TextureWrap wrap_u = TextureWrap::repeat, wrap_v = TextureWrap::repeat;
-  TextureFilter filter = TextureFilter::linear;
+  PictureWrap wrap_u = PictureWrap::repeat, wrap_v = PictureWrap::repeat;
+  PictureFilter filter = PictureFilter::linear;
 };
-struct Texture {
+struct Picture {
   uint32_t image = none, webp = none;
   Sampler sampler;
 };
-/// How a material uses a texture; (u, v) goes to row 0 and row 1 of `transform`.
-struct TextureInfo {
-  uint32_t texture = none, channel = 0;
+/// How a material uses a picture; (u, v) goes to row 0 and row 1 of `transform`.
+struct PictureInfo {
+  uint32_t picture = none, channel = 0;
   std::optional<std::array<std::array<double, 3>, 2>> transform;
 };
 struct Material {
   MeshMaterial material;
-  TextureInfo color, emission;
+  PictureInfo color, emission;
 };
 
 using Attributes = std::map<std::string, uint32_t>;  ///< accessors by name
@@ -136,7 +136,7 @@ struct Document {
   std::vector<View> views;
   std::vector<Accessor> accessors;
   std::vector<Image> images;
-  std::vector<Texture> textures;
+  std::vector<Picture> pictures;
   std::vector<Material> materials;
   std::vector<Mesh> meshes;
   std::vector<Node> nodes;  ///< trees: no node is below itself, or below two others

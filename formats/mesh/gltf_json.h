@@ -94,8 +94,8 @@ inline std::string text_of(const Item& item, const char* name) {
   return at && at->is_string() ? at->get<std::string>() : std::string();
 }
 
-/// Textures and materials: gltf_materials.cc. `document` has images already.
-Status read_textures(const Json& file, const std::string& path, Document& document);
+/// Pictures and materials: gltf_materials.cc. `document` has images already.
+Status read_pictures(const Json& file, const std::string& path, Document& document);
 Status read_materials(const Json& file, const std::string& path, Document& document);
 
 }  // namespace voxkit::gltf

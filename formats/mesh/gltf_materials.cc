@@ -1,14 +1,14 @@
-// Textures and materials of glTF files.
+// Pictures and materials of glTF files.
 #include "formats/mesh/gltf_json.h"
 
 namespace voxkit::gltf {
 namespace {
 
-TextureWrap wrap_of(uint64_t value) {
+PictureWrap wrap_of(uint64_t value) {
   constexpr uint64_t clamp_to_edge = 33071, mirrored_repeat = 33648;
-  return value == clamp_to_edge     ? TextureWrap::clamp
-         : value == mirrored_repeat ? TextureWrap::mirror
-                                    : TextureWrap::repeat;
+  return value == clamp_to_edge     ? PictureWrap::clamp
+         : value == mirrored_repeat ? PictureWrap::mirror
+                                    : PictureWrap::repeat;
 }
 
 Result<std::vector<Sampler>> read_samplers(const Json& file, const std::string& path) {
@@ -20,18 +20,18 @@ Result<std::vector<Sampler>> read_samplers(const Json& file, const std::string& 
                filter = whole(item, "magFilter", linear);
     if (!u || !v || !filter) return item.bad("expected numbers");
     samplers.push_back(
-        {wrap_of(*u), wrap_of(*v), *filter == nearest ? TextureFilter::nearest : TextureFilter::linear});
+        {wrap_of(*u), wrap_of(*v), *filter == nearest ? PictureFilter::nearest : PictureFilter::linear});
   }
   return samplers;
 }
 
-Result<TextureInfo> read_info(const Item& owner, const char* name, const Document& document) {
-  TextureInfo info;
+Result<PictureInfo> read_info(const Item& owner, const char* name, const Document& document) {
+  PictureInfo info;
   const Json* const json = owner.find(name);
   if (!json) return info;
   const Item item = owner.below(*json);
-  VOX_TRY(info.texture, index_of(item, "index", document.textures.size(), "texture"));
-  if (info.texture == none) return item.bad(fmt::format("expected an index of its {}", name));
+  VOX_TRY(info.picture, index_of(item, "index", document.pictures.size(), "texture"));
+  if (info.picture == none) return item.bad(fmt::format("expected an index of its {}", name));
   auto channel = whole(item, "texCoord", 0);
   const Json* const transform = item.extension("KHR_texture_transform");
   if (transform) {
@@ -86,9 +86,9 @@ Status read_material(const Item& item, Document& document) {
   material.alpha_cutoff = static_cast<float>(cutoff);
   if (!sound) return item.bad("expected numbers for its factors");
 
-  const auto use = [&](const TextureInfo& info, TextureWrap& u, TextureWrap& v, TextureFilter& filter) {
-    if (info.texture == none) return;
-    const Sampler& sampler = document.textures[info.texture].sampler;
+  const auto use = [&](const PictureInfo& info, PictureWrap& u, PictureWrap& v, PictureFilter& filter) {
+    if (info.picture == none) return;
+    const Sampler& sampler = document.pictures[info.picture].sampler;
     u = sampler.wrap_u, v = sampler.wrap_v, filter = sampler.filter;
   };
   use(out.color, material.wrap_u, material.wrap_v, material.filter);
@@ -117,18 +117,18 @@ void note_materials(const Json& file, Document& document) {
 
 }  // namespace
 
-Status read_textures(const Json& file, const std::string& path, Document& document) {
+Status read_pictures(const Json& file, const std::string& path, Document& document) {
   VOX_TRY(const auto samplers, read_samplers(file, path));
   for (const Json& json : list_of(file, "textures")) {
-    const Item item{json, "texture", document.textures.size(), path};
-    Texture texture;
-    VOX_TRY(texture.image, index_of(item, "source", document.images.size(), "image"));
+    const Item item{json, "texture", document.pictures.size(), path};
+    Picture picture;
+    VOX_TRY(picture.image, index_of(item, "source", document.images.size(), "image"));
     if (const Json* const webp = item.extension("EXT_texture_webp")) {
-      VOX_TRY(texture.webp, index_of(item.below(*webp), "source", document.images.size(), "image"));
+      VOX_TRY(picture.webp, index_of(item.below(*webp), "source", document.images.size(), "image"));
     }
     VOX_TRY(const uint32_t sampler, index_of(item, "sampler", samplers.size(), "sampler"));
-    if (sampler != none) texture.sampler = samplers[sampler];
-    document.textures.push_back(texture);
+    if (sampler != none) picture.sampler = samplers[sampler];
+    document.pictures.push_back(picture);
   }
   return {};
 }

@@ -34,8 +34,8 @@ class PrimitiveReader {
       out_.positions[i][static_cast<int>(c)] += change;
     }));
     if (primitive_.attributes.contains("COLOR_0")) VOX_CHECK(read_colors());
-    if (first_.texture != none) VOX_CHECK(read_uvs(first_, out_.uvs));
-    if (second_.texture != none) VOX_CHECK(read_uvs(second_, out_.emission_uvs));
+    if (first_.picture != none) VOX_CHECK(read_uvs(first_, out_.uvs));
+    if (second_.picture != none) VOX_CHECK(read_uvs(second_, out_.emission_uvs));
     if (skinned) VOX_CHECK(read_joints());
     VOX_CHECK(read_corners());
     return std::move(out_);
@@ -51,22 +51,22 @@ class PrimitiveReader {
     return {};
   }
 
-  /// Which texture coordinates are wanted: of colours, or of emission where only that has a texture; and of
+  /// Which picture coordinates are wanted: of colours, or of emission where only that has a picture; and of
   /// emission, where they are others.
   Status read_material_uses() {
     if (primitive_.material == none) return {};
     const Material& material = document_.materials[primitive_.material];
-    first_ = material.color.texture != none ? material.color : material.emission;
-    if (material.color.texture != none && material.emission.texture != none &&
+    first_ = material.color.picture != none ? material.color : material.emission;
+    if (material.color.picture != none && material.emission.picture != none &&
         (material.color.channel != material.emission.channel ||
          material.color.transform != material.emission.transform))
       second_ = material.emission;
-    for (const TextureInfo& info : {first_, second_})
-      out_.lacks_uvs |= info.texture != none && !primitive_.attributes.contains(name_of(info));
+    for (const PictureInfo& info : {first_, second_})
+      out_.lacks_uvs |= info.picture != none && !primitive_.attributes.contains(name_of(info));
     if (out_.lacks_uvs) first_ = second_ = {};
     return {};
   }
-  static std::string name_of(const TextureInfo& info) { return fmt::format("TEXCOORD_{}", info.channel); }
+  static std::string name_of(const PictureInfo& info) { return fmt::format("TEXCOORD_{}", info.channel); }
 
   /// The names that are packed, as far as they are wanted, and their values; whole numbers are made floats as
   /// their accessors say.
@@ -163,7 +163,7 @@ class PrimitiveReader {
     });
   }
 
-  Status read_uvs(const TextureInfo& info, std::vector<glm::vec2>& to) {
+  Status read_uvs(const PictureInfo& info, std::vector<glm::vec2>& to) {
     const std::string name = name_of(info);
     VOX_TRY(const auto values, attribute(name, 2, 2));
     to.resize(count_);
@@ -221,7 +221,7 @@ class PrimitiveReader {
   const std::string& path_;
   Context& ctx_;
   uint64_t count_ = 0;
-  TextureInfo first_, second_;
+  PictureInfo first_, second_;
   std::vector<std::string> names_;  ///< of what is unpacked
   std::optional<DracoMesh> unpacked_;
   Geometry out_;

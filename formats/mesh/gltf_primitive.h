@@ -15,7 +15,7 @@ struct Geometry {
   std::vector<uint32_t> corners;             ///< numbers of positions, as the primitive's mode has them
   /// Of a skin: joints and weights, four each, of all sets.
   std::vector<Values<float>> joints, weights;
-  bool lacks_uvs = false;  ///< that the material's textures need
+  bool lacks_uvs = false;  ///< that the material's pictures need
   std::vector<Reservation> memory;
 };
 

@@ -172,23 +172,23 @@ class SceneReader {
     }
     const Material& material = document_.materials[index];
     MeshParts::Maps maps;
-    const auto image_of = [&](const TextureInfo& info) -> Result<TextureReference> {
-      const gltf::Texture& texture = document_.textures[info.texture];
+    const auto image_of = [&](const PictureInfo& info) -> Result<PictureReference> {
+      const gltf::Picture& picture = document_.pictures[info.picture];
       const bool webp =
-          texture.webp != none &&
-          (texture.image == none || load_module({"webp", "reading WebP textures", "libwebp-dev"}));
-      const uint32_t image = webp ? texture.webp : texture.image;
+          picture.webp != none &&
+          (picture.image == none || load_module({"webp", "reading WebP textures", "libwebp-dev"}));
+      const uint32_t image = webp ? picture.webp : picture.image;
       if (image == none)
         return bad_input(path_,
                          fmt::format("material {}: its texture {} has no picture of a known kind: expected "
                                      "PNG, JPEG or WebP",
-                                     material.material.name, info.texture));
+                                     material.material.name, info.picture));
       return buffers_.image(image);
     };
-    if (material.color.texture != none) {
+    if (material.color.picture != none) {
       VOX_TRY(maps.color, image_of(material.color));
     }
-    if (material.emission.texture != none) {
+    if (material.emission.picture != none) {
       VOX_TRY(maps.emission, image_of(material.emission));
     }
     at->second = builder_.add_material(material.material, std::move(maps));
@@ -212,7 +212,7 @@ class SceneReader {
         continue;
       }
       VOX_TRY(uint32_t material, material_of(primitive.material));
-      if (geometry.lacks_uvs) material = builder_.without_textures(material);
+      if (geometry.lacks_uvs) material = builder_.without_pictures(material);
       if (node.skin != none) VOX_CHECK(bend(document_.skins[node.skin], node, geometry));
       VOX_CHECK(builder_.add_attributes({.uvs = !geometry.uvs.empty(),
                                          .emission_uvs = !geometry.emission_uvs.empty(),

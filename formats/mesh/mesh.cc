@@ -116,51 +116,51 @@ Status check_mesh(Mesh& mesh, const std::string& path) {
   return {};
 }
 
-Status load_textures(MeshParts& parts, const std::string& path, Context& ctx) {
+Status load_pictures(MeshParts& parts, const std::string& path, Context& ctx) {
   Mesh& mesh = parts.mesh;
   std::vector<bool> used(mesh.materials.size());
   for (const MeshTriangle& triangle : mesh.triangles) used[triangle.material] = true;
   for (const MeshPoint& point : mesh.points) used[point.material] = true;
   const std::string folder = std::filesystem::path(path).parent_path().string();
 
-  const auto load = [&](const TextureReference& reference, const std::string& material) -> Result<Texture> {
-    Result<Texture> texture;
+  const auto load = [&](const PictureReference& reference, const std::string& material) -> Result<Picture> {
+    Result<Picture> picture;
     if (!reference.bytes.empty()) {
-      texture = decode_texture(path, reference.bytes, ctx);
+      picture = decode_picture(path, reference.bytes, ctx);
     } else {
-      const std::string file = find_texture(folder, reference.name);
+      const std::string file = find_picture(folder, reference.name);
       if (file.empty())
         return bad_input(
             path, fmt::format("material {}: its texture {} is missing: expected it beside the mesh", material,
                               reference.name));
-      texture = read_texture(file, ctx);
+      picture = read_picture(file, ctx);
     }
-    if (texture && (reference.base != 0 || reference.gain != 1))
-      adjust_colors(*texture, reference.base, reference.gain);
-    return texture;
+    if (picture && (reference.base != 0 || reference.gain != 1))
+      adjust_colors(*picture, reference.base, reference.gain);
+    return picture;
   };
-  // Embedded textures have names of their own.
-  const auto key_of = [](const TextureReference& r) {
+  // Embedded pictures have names of their own.
+  const auto key_of = [](const PictureReference& r) {
     return r.used() ? fmt::format("{}\n{} {} {}", r.name, r.base, r.gain, static_cast<int>(r.channel)) : "";
   };
   std::map<std::pair<std::string, std::string>, int32_t> known;
-  const auto texture_of = [&](const TextureReference& color, const TextureReference& opacity,
+  const auto picture_of = [&](const PictureReference& color, const PictureReference& opacity,
                               const std::string& material) -> Result<int32_t> {
     auto [at, is_new] = known.try_emplace({key_of(color), key_of(opacity)}, 0);
     if (!is_new) return at->second;
-    Texture texture;
+    Picture picture;
     if (color.used()) {
-      VOX_TRY(texture, load(color, material));
+      VOX_TRY(picture, load(color, material));
     }
     if (opacity.used()) {
-      VOX_TRY(const Texture mask, load(opacity, material));
+      VOX_TRY(const Picture mask, load(opacity, material));
       if (!color.used()) {
-        VOX_TRY(texture, plain_texture(mask.width, mask.height, 0xffffffff, ctx));
+        VOX_TRY(picture, plain_picture(mask.width, mask.height, 0xffffffff, ctx));
       }
-      set_opacity(texture, mask, opacity.channel);
+      set_opacity(picture, mask, opacity.channel);
     }
-    at->second = static_cast<int32_t>(mesh.textures.size());
-    mesh.textures.push_back(std::move(texture));
+    at->second = static_cast<int32_t>(mesh.pictures.size());
+    mesh.pictures.push_back(std::move(picture));
     return at->second;
   };
   int masks = 0;
@@ -168,14 +168,14 @@ Status load_textures(MeshParts& parts, const std::string& path, Context& ctx) {
     const MeshParts::Maps& maps = parts.maps[i];
     MeshMaterial& material = mesh.materials[i];
     if (used[i] && (maps.color.used() || maps.opacity.used())) {
-      VOX_TRY(material.texture, texture_of(maps.color, maps.opacity, material.name));
-      if (maps.alpha_from_texture && mesh.textures[static_cast<size_t>(material.texture)].has_alpha) {
+      VOX_TRY(material.picture, picture_of(maps.color, maps.opacity, material.name));
+      if (maps.alpha_from_picture && mesh.pictures[static_cast<size_t>(material.picture)].has_alpha) {
         material.alpha_mode = AlphaMode::mask;
         ++masks;
       }
     }
     if (used[i] && maps.emission.used() && material.emits()) {
-      VOX_TRY(material.emission_texture, texture_of(maps.emission, {}, material.name));
+      VOX_TRY(material.emission_picture, picture_of(maps.emission, {}, material.name));
     }
   }
   if (masks)
@@ -188,7 +188,7 @@ Result<Mesh> read_mesh(const std::string& path, Context& ctx) {
   if (!is_mesh_name(path)) return bad_input(path, "not a mesh: expected .obj, .gltf, .glb or .ply");
   VOX_TRY(MeshParts parts, read_parts(path, ctx));
   VOX_CHECK(check_mesh(parts.mesh, path));
-  VOX_CHECK(load_textures(parts, path, ctx));
+  VOX_CHECK(load_pictures(parts, path, ctx));
   return std::move(parts.mesh);
 }
 

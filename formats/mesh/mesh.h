@@ -9,16 +9,16 @@
 #include <string>
 #include <vector>
 
-#include "formats/mesh/texture.h"
+#include "formats/mesh/picture.h"
 #include "formats/reservation.h"
 
 namespace voxkit {
 
-/// How a texture goes on outside of 0..1.
-enum class TextureWrap : uint8_t { repeat, mirror, clamp };
+/// How a picture goes on outside of 0..1.
+enum class PictureWrap : uint8_t { repeat, mirror, clamp };
 
 /// What is seen between the middles of texels where these are larger than what looks.
-enum class TextureFilter : uint8_t {
+enum class PictureFilter : uint8_t {
   linear,   ///< a mean of those around
   nearest,  ///< the nearest one
 };
@@ -32,17 +32,17 @@ enum class AlphaMode : uint8_t {
 
 struct MeshMaterial {
   std::string name;
-  glm::vec4 color{1, 1, 1, 1};  ///< linear light and alpha, 0..1; multiplies the texture
-  int32_t texture = -1;         ///< index into Mesh::textures, or -1
-  TextureWrap wrap_u = TextureWrap::repeat, wrap_v = TextureWrap::repeat;
-  TextureFilter filter = TextureFilter::linear;
+  glm::vec4 color{1, 1, 1, 1};  ///< linear light and alpha, 0..1; multiplies the picture
+  int32_t picture = -1;         ///< index into Mesh::pictures, or -1
+  PictureWrap wrap_u = PictureWrap::repeat, wrap_v = PictureWrap::repeat;
+  PictureFilter filter = PictureFilter::linear;
   AlphaMode alpha_mode = AlphaMode::opaque;
   float alpha_cutoff = 0.5f;
 
-  glm::vec3 emission{0, 0, 0};    ///< linear light, 0 or more; multiplies its texture
-  int32_t emission_texture = -1;  ///< index into Mesh::textures, or -1
-  TextureWrap emission_wrap_u = TextureWrap::repeat, emission_wrap_v = TextureWrap::repeat;
-  TextureFilter emission_filter = TextureFilter::linear;
+  glm::vec3 emission{0, 0, 0};    ///< linear light, 0 or more; multiplies its picture
+  int32_t emission_picture = -1;  ///< index into Mesh::pictures, or -1
+  PictureWrap emission_wrap_u = PictureWrap::repeat, emission_wrap_v = PictureWrap::repeat;
+  PictureFilter emission_filter = PictureFilter::linear;
   bool emits() const { return emission.r > 0 || emission.g > 0 || emission.b > 0; }
 };
 
@@ -59,15 +59,15 @@ struct MeshPoint {
 /// A scene in one coordinate system. The memory counts against ctx.memory, which must outlive the mesh.
 struct Mesh {
   std::vector<glm::dvec3> positions;  ///< finite; in the unit of the file
-  /// Texture coordinates of the vertices, or none: (0, 0) is the top left corner of a texture, (1, 1) the
+  /// Picture coordinates of the vertices, or none: (0, 0) is the top left corner of a picture, (1, 1) the
   /// bottom right one. Finite.
   std::vector<glm::vec2> uvs;
-  std::vector<glm::vec2> emission_uvs;  ///< of emission textures; none: these go by `uvs`, too
+  std::vector<glm::vec2> emission_uvs;  ///< of emission pictures; none: these go by `uvs`, too
   std::vector<glm::vec4> colors;        ///< of the vertices, or none: linear light and alpha, 0..1
   std::vector<MeshTriangle> triangles;  ///< all of them have an area
   std::vector<MeshPoint> points;
   std::vector<MeshMaterial> materials;
-  std::vector<Texture> textures;
+  std::vector<Picture> pictures;
   std::vector<std::string> notes;  ///< what the file says and the mesh cannot, a sentence each
   std::vector<Reservation> memory;
 };
@@ -77,12 +77,12 @@ bool is_mesh_name(const std::string& name);
 
 /// Reads a mesh: the triangles and points of all nodes of the scene in their places, polygons split, lines
 /// left out, triangles without area dropped. Colours of .obj and .ply files are taken as sRGB, those of glTF
-/// as linear light, as their specifications or usual writers have it. Materials of .obj whose texture or
+/// as linear light, as their specifications or usual writers have it. Materials of .obj whose picture or
 /// opacity map has alpha are masks with a cut-off of 0.5.
 ///
 /// A .ply file without faces is no mesh but points (point_cloud.h): ErrorCode::input.
 ///
-/// A texture, a material library or a buffer that the mesh names and that is not there is an error, since the
+/// A picture, a material library or a buffer that the mesh names and that is not there is an error, since the
 /// colours would be wrong in silence. Errors: ErrorCode::input, ErrorCode::limit.
 Result<Mesh> read_mesh(const std::string& path, Context& ctx);
 

@@ -94,7 +94,7 @@ uint32_t MeshBuilder::add_material(MeshMaterial material, MeshParts::Maps maps) 
   return static_cast<uint32_t>(plain_.size() - 1);
 }
 
-uint32_t MeshBuilder::without_textures(uint32_t index) {
+uint32_t MeshBuilder::without_pictures(uint32_t index) {
   const MeshParts::Maps& maps = parts_.maps[index];
   if (!maps.color.used() && !maps.opacity.used() && !maps.emission.used()) return index;
   if (plain_[index] == UINT32_MAX) {

@@ -66,8 +66,8 @@ class MeshBuilder {
   Status add_strip(std::span<const uint32_t> corners, uint32_t material);
 
   uint32_t add_material(MeshMaterial material, MeshParts::Maps maps = {});
-  /// A copy of a material that uses no textures, for what has no texture coordinates.
-  uint32_t without_textures(uint32_t material);
+  /// A copy of a material that uses no pictures, for what has no picture coordinates.
+  uint32_t without_pictures(uint32_t material);
   MeshMaterial& material(uint32_t index) { return parts_.mesh.materials[index]; }
   MeshParts::Maps& maps(uint32_t index) { return parts_.maps[index]; }
   void note(std::string sentence) { parts_.mesh.notes.push_back(std::move(sentence)); }
@@ -83,7 +83,7 @@ class MeshBuilder {
   CountedList<glm::vec4> colors_;
   CountedList<MeshTriangle> triangles_;
   CountedList<MeshPoint> points_;
-  std::vector<uint32_t> plain_;  ///< of materials: their copies without textures, or themselves
+  std::vector<uint32_t> plain_;  ///< of materials: their copies without pictures, or themselves
   PolygonSplitter splitter_;
   std::vector<glm::dvec3> corners_;
   std::vector<std::array<uint32_t, 3>> split_;

@@ -5,7 +5,7 @@
 #include <string>
 #include <vector>
 
-#include "formats/mesh/texture.h"
+#include "formats/mesh/picture.h"
 #include "formats/module.h"
 
 namespace voxkit {
@@ -31,7 +31,7 @@ struct DracoAttribute {
 };
 
 struct MeshModule {
-  Result<Texture> (*decode_webp)(const std::string& name, std::span<const std::byte> bytes,
+  Result<Picture> (*decode_webp)(const std::string& name, std::span<const std::byte> bytes,
                                  Context& ctx) = nullptr;
   /// False where the bytes are damaged. `out` has count * stride bytes.
   bool (*decode_meshopt)(const MeshoptView& view, std::span<const std::byte> bytes,

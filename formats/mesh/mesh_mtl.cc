@@ -21,9 +21,9 @@ std::string lower(std::string_view text) {
 
 /// Words of the options and the name of a map.
 struct MapWords {
-  TextureReference texture;
+  PictureReference picture;
   MapTransform transform;
-  TextureWrap wrap = TextureWrap::repeat;
+  PictureWrap wrap = PictureWrap::repeat;
 };
 
 class MtlReader {
@@ -41,7 +41,7 @@ class MtlReader {
         if (!is_new) unused_ = {};
         now_ = is_new ? &at->second : &unused_;
         now_->material.name = name;
-        now_->maps.alpha_from_texture = true;
+        now_->maps.alpha_from_picture = true;
         dissolved_ = false;
       } else if (now_) {
         VOX_CHECK(read_property(keyword));
@@ -52,7 +52,7 @@ class MtlReader {
     return {};
   }
 
-  /// Opacity lies on the texture of colours: as that does.
+  /// Opacity lies on the picture of colours: as that does.
   Status join_opacity() {
     for (const auto& [material, transform, wrap] : opacity_) {
       if (!material->maps.color.used()) {
@@ -94,19 +94,19 @@ class MtlReader {
       material.alpha_mode = material.color.a < 1 ? AlphaMode::blend : AlphaMode::opaque;
     } else if (keyword == "map_kd") {
       VOX_TRY(const MapWords map, read_map());
-      now_->maps.color = map.texture;
+      now_->maps.color = map.picture;
       now_->color = map.transform;
       material.wrap_u = material.wrap_v = map.wrap;
     } else if (keyword == "map_ke") {
       VOX_TRY(const MapWords map, read_map());
-      now_->maps.emission = map.texture;
+      now_->maps.emission = map.picture;
       now_->emission = map.transform;
       material.emission_wrap_u = material.emission_wrap_v = map.wrap;
       // A map alone is seen: it is multiplied by 1.
       if (!material.emits()) material.emission = glm::vec3(1);
     } else if (keyword == "map_d") {
       VOX_TRY(const MapWords map, read_map());
-      now_->maps.opacity = map.texture;
+      now_->maps.opacity = map.picture;
       if (now_ != &unused_) opacity_.push_back({now_, map.transform, map.wrap});
     } else if (is_any(keyword, {"map_ks", "map_ns", "map_bump", "bump", "norm", "disp", "map_disp", "decal",
                                 "refl", "map_pr", "map_pm", "map_ps", "map_tr", "map_refl"})) {
@@ -170,14 +170,14 @@ class MtlReader {
       } else if (option == "-mm") {
         if (numbers(values, 2) != 2 || !(std::abs(values[0]) < 1e6 && std::abs(values[1]) < 1e6))
           return bad("-mm: expected two numbers");
-        out.texture.base = static_cast<float>(values[0]);
-        out.texture.gain = static_cast<float>(values[1]);
+        out.picture.base = static_cast<float>(values[0]);
+        out.picture.gain = static_cast<float>(values[1]);
       } else if (option == "-clamp") {
-        out.wrap = lower(next()) == "on" ? TextureWrap::clamp : TextureWrap::repeat;
+        out.wrap = lower(next()) == "on" ? PictureWrap::clamp : PictureWrap::repeat;
       } else if (option == "-imfchan") {
         const std::string channel = lower(next());
         if (channel.size() == 1 && std::string_view("rgbml").find(channel[0]) != std::string_view::npos)
-          out.texture.channel = channel[0];
+          out.picture.channel = channel[0];
         else
           return bad(fmt::format("-imfchan {}: expected r, g, b, m or l", channel));
       } else if (is_any(option, {"-blendu", "-blendv", "-boost", "-bm", "-cc", "-texres", "-type"})) {
@@ -189,14 +189,14 @@ class MtlReader {
     }
     if (left.size() > 1 && left.front() == '"' && left.back() == '"') left = left.substr(1, left.size() - 2);
     if (left.empty()) return bad("a map without the name of its file");
-    out.texture.name = left;
+    out.picture.name = left;
     return out;
   }
 
   struct Opacity {
     ObjMaterial* material;
     MapTransform transform;
-    TextureWrap wrap;
+    PictureWrap wrap;
   };
   TextStatements lines_;
   const std::string& path_;

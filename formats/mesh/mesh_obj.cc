@@ -101,7 +101,7 @@ class ObjReader {
   Status read_libraries(std::string_view rest) {
     const std::string folder = std::filesystem::path(path_).parent_path().string();
     std::vector<std::string> names{std::string(rest)};
-    if (find_texture(folder, names[0]).empty() && rest.find_first_of(" \t") != rest.npos) {
+    if (find_picture(folder, names[0]).empty() && rest.find_first_of(" \t") != rest.npos) {
       names.clear();
       for (size_t at = 0; (at = rest.find_first_not_of(" \t", at)) != rest.npos;) {
         const size_t end = std::min(rest.find_first_of(" \t", at), rest.size());
@@ -111,10 +111,10 @@ class ObjReader {
     }
     for (const std::string& name : names) {
       if (!read_.insert(name).second) continue;
-      std::string file = find_texture(folder, name);
+      std::string file = find_picture(folder, name);
       if (file.empty()) {
         // Of a mesh that was renamed.
-        file = find_texture(folder, std::filesystem::path(path_).stem().string() + ".mtl");
+        file = find_picture(folder, std::filesystem::path(path_).stem().string() + ".mtl");
         if (file.empty()) return bad_input(path_, fmt::format("{} is missing, which the mesh needs", name));
         builder_.note(
             fmt::format("{} is missing: {} is taken", name, std::filesystem::path(file).filename().string()));
@@ -165,7 +165,7 @@ class ObjReader {
           read.values.push_back(corner);
         }
         if (!material_) VOX_CHECK(use_material(""));
-        const uint32_t material = has_uvs ? **material_ : builder_.without_textures(**material_);
+        const uint32_t material = has_uvs ? **material_ : builder_.without_pictures(**material_);
         corners.values.clear();
         VOX_CHECK(corners.make_room(read.values.size(), "a polygon", ctx_));
         for (const Corner& corner : read.values) {

@@ -15,7 +15,7 @@ namespace voxkit {
 /// lead to later ones. Errors: ErrorCode::input with the line, ErrorCode::limit.
 Result<MeshParts> read_obj(const std::string& path, Context& ctx);
 
-/// Texture coordinates, which count from the bottom here, become scale * uv + offset (-s and -o).
+/// Picture coordinates, which count from the bottom here, become scale * uv + offset (-s and -o).
 struct MapTransform {
   glm::dvec2 scale{1, 1}, offset{0, 0};
   friend bool operator==(const MapTransform&, const MapTransform&) = default;

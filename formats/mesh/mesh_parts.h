@@ -10,8 +10,8 @@
 
 namespace voxkit {
 
-/// A texture that a mesh uses: a file, or bytes in the mesh's own files.
-struct TextureReference {
+/// A picture that a mesh uses: a file, or bytes in the mesh's own files.
+struct PictureReference {
   std::string name;                   ///< as the mesh has it; for errors where it is embedded
   std::span<const std::byte> bytes;   ///< of an embedded picture; empty for a file of its own
   std::shared_ptr<const void> owner;  ///< of these
@@ -23,22 +23,22 @@ struct TextureReference {
   bool used() const { return !name.empty() || !bytes.empty(); }
 };
 
-/// What a reader of mesh files finds. `mesh.materials` have no textures yet.
+/// What a reader of mesh files finds. `mesh.materials` have no pictures yet.
 struct MeshParts {
   Mesh mesh;
   struct Maps {
-    TextureReference color, opacity, emission;
-    bool alpha_from_texture = false;  ///< a mask where the texture has alpha, as in .obj files
+    PictureReference color, opacity, emission;
+    bool alpha_from_picture = false;  ///< a mask where the picture has alpha, as in .obj files
   };
   std::vector<Maps> maps;  ///< one a material
 };
 
-/// Checks that indices are in range and positions and texture coordinates finite where triangles use them,
+/// Checks that indices are in range and positions and picture coordinates finite where triangles use them,
 /// brings colours into 0..1, and drops triangles without area, and points that are nowhere. Errors:
 /// ErrorCode::input.
 Status check_mesh(Mesh& mesh, const std::string& path);
 
-/// Reads the textures of the materials that triangles and points use; each once.
-Status load_textures(MeshParts& parts, const std::string& path, Context& ctx);
+/// Reads the pictures of the materials that triangles and points use; each once.
+Status load_pictures(MeshParts& parts, const std::string& path, Context& ctx);
 
 }  // namespace voxkit

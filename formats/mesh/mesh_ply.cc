@@ -114,12 +114,12 @@ class PlyReader {
       corners.clear();
       texcoords.clear();
       glm::vec4 color(0, 0, 0, 1);
-      uint32_t texture = 0;
+      uint32_t picture = 0;
       for (const Property& p : element.properties) {
         if (!p.list && p.role != Role::none) {
           VOX_TRY(const double value, numbers.next(p.type));
-          if (p.role == Role::texture)
-            texture = value >= 0 && value < 65536 ? static_cast<uint32_t>(value) : UINT32_MAX;
+          if (p.role == Role::picture)
+            picture = value >= 0 && value < 65536 ? static_cast<uint32_t>(value) : UINT32_MAX;
           else
             set_color(color, p, value);
           continue;
@@ -143,13 +143,13 @@ class PlyReader {
           }
         }
       }
-      if (texture >= std::max<size_t>(header_.textures.size(), 1))
-        return bad_input(path_, fmt::format("corrupt PLY file: a face of texture {}: there are {}", texture,
-                                            header_.textures.size()));
+      if (picture >= std::max<size_t>(header_.pictures.size(), 1))
+        return bad_input(path_, fmt::format("corrupt PLY file: a face of texture {}: there are {}", picture,
+                                            header_.pictures.size()));
       if (strips) {
         VOX_CHECK(add_strips(corners));
       } else {
-        VOX_CHECK(add_face(corners, texcoords, colors ? &color : nullptr, texture));
+        VOX_CHECK(add_face(corners, texcoords, colors ? &color : nullptr, picture));
       }
     }
     return {};
@@ -174,9 +174,9 @@ class PlyReader {
     return builder_.add_strip(numbers32_, 0);
   }
 
-  /// A face with texture coordinates or a colour of its own has vertices of its own.
+  /// A face with picture coordinates or a colour of its own has vertices of its own.
   Status add_face(std::span<const int64_t> corners, const std::vector<glm::vec2>& texcoords,
-                  const glm::vec4* color, uint32_t texture) {
+                  const glm::vec4* color, uint32_t picture) {
     if (corners.size() < 3) return {};
     const bool uvs = texcoords.size() == corners.size();
     if (uvs) VOX_CHECK(builder_.add_attributes({.uvs = true}));
@@ -192,22 +192,22 @@ class PlyReader {
       }
       numbers32_.push_back(number);
     }
-    return builder_.add_polygon(numbers32_, texture);
+    return builder_.add_polygon(numbers32_, picture);
   }
 
-  /// One for each texture, in their order.
+  /// One for each picture, in their order.
   void add_materials() {
     const bool uvs = builder_.attributes().uvs;
-    for (size_t i = 0; i < std::max<size_t>(header_.textures.size(), 1); ++i) {
+    for (size_t i = 0; i < std::max<size_t>(header_.pictures.size(), 1); ++i) {
       MeshParts::Maps maps;
-      if (uvs && i < header_.textures.size()) maps.color.name = header_.textures[i];
+      if (uvs && i < header_.pictures.size()) maps.color.name = header_.pictures[i];
       MeshMaterial material;
       if (faint_) material.alpha_mode = AlphaMode::blend;
       builder_.add_material(material, std::move(maps));
     }
-    if (!uvs && !header_.textures.empty())
+    if (!uvs && !header_.pictures.empty())
       builder_.note(
-          fmt::format("the texture {} is left out: there are no texture coordinates", header_.textures[0]));
+          fmt::format("the texture {} is left out: there are no texture coordinates", header_.pictures[0]));
   }
 
   const Header& header_;

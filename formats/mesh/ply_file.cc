@@ -56,7 +56,7 @@ Role role_of(std::string_view element, std::string_view property, bool list) {
     for (const auto& [name, role] : of_faces)
       if (property == name && (role == corners || !strips)) return role;
   if (element == "face" && !list) {
-    if (property == "texnumber") return texture;
+    if (property == "texnumber") return picture;
     for (const auto& [name, role] : of_vertices)
       if (property == name && role >= red && role <= alpha) return role;
   }
@@ -131,7 +131,7 @@ Result<Header> read_header(std::span<const std::byte> bytes, const std::string& 
     if (words.empty() || words[0] == "ply" || words[0] == "obj_info") continue;
     if (words[0] == "comment") {
       if (words.size() > 2 && words[1] == "TextureFile")
-        header.textures.emplace_back(words[2].data(), words.back().data() + words.back().size());
+        header.pictures.emplace_back(words[2].data(), words.back().data() + words.back().size());
     } else if (words[0] == "end_header") {
       header.end = at;
       if (!has_format) return broken("no format is named");

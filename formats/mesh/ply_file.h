@@ -21,7 +21,7 @@ double load(const std::byte* bytes, Type type, bool big_endian);
 double scale_of(Type type);
 
 /// What of a mesh a property is.
-enum class Role : uint8_t { none, x, y, z, red, green, blue, alpha, u, v, corners, texcoords, texture };
+enum class Role : uint8_t { none, x, y, z, red, green, blue, alpha, u, v, corners, texcoords, picture };
 
 struct Property {
   Type type = Type::f32, count_type = Type::u8;
@@ -41,7 +41,7 @@ struct Element {
 struct Header {
   bool ascii = false, big_endian = false;
   std::vector<Element> elements;
-  std::vector<std::string> textures;
+  std::vector<std::string> pictures;
   std::vector<std::string> dropped;  ///< elements and properties that are no part of a mesh
   size_t end = 0;                    ///< where the data begins
   /// What is dropped, in a sentence; nothing where nothing is.

@@ -41,21 +41,21 @@ class MengerSource final : public VolumeSource {
         if (rest % 3 == 1) ones |= uint32_t{1} << place;
       }
       digits_[static_cast<size_t>(i)] = ones;
-      red_[static_cast<size_t>(i)] = pixel_byte(0, colour(i));
+      red_[static_cast<size_t>(i)] = pixel_byte(0, color(i));
     }
   }
 
   Status read(const Box& box, VoxelSpan out) override {
     const int64_t width = box.size().x;
     for (int64_t z = box.lo.z; z < box.hi.z; ++z) {
-      const uint32_t blue = pixel_byte(2, colour(z)) | pixel_byte(3, 255);
+      const uint32_t blue = pixel_byte(2, color(z)) | pixel_byte(3, 255);
       for (int64_t y = box.lo.y; y < box.hi.y; ++y) {
         std::byte* row = out.row(y - box.lo.y, z - box.lo.z);
         if ((digits(y) & digits(z)) != 0) {
           std::memset(row, 0, static_cast<size_t>(4 * width));
         } else {
           write_row(digits_.data() + box.lo.x, red_.data() + box.lo.x, width, digits(y) | digits(z),
-                    pixel_byte(1, colour(y)) | blue, row);
+                    pixel_byte(1, color(y)) | blue, row);
         }
       }
     }
@@ -69,12 +69,12 @@ class MengerSource final : public VolumeSource {
     const uint32_t z = shared_digits(box.lo.z, box.hi.z);
     if (((x & y) | (x & z) | (y & z)) != 0) return Voxel{};
     if (box.voxels() != 1) return std::nullopt;
-    return Voxel::of(pixel_byte(0, colour(box.lo.x)) | pixel_byte(1, colour(box.lo.y)) |
-                     pixel_byte(2, colour(box.lo.z)) | pixel_byte(3, 255));
+    return Voxel::of(pixel_byte(0, color(box.lo.x)) | pixel_byte(1, color(box.lo.y)) |
+                     pixel_byte(2, color(box.lo.z)) | pixel_byte(3, 255));
   }
 
  private:
-  int64_t colour(int64_t i) const { return 255 * i / info_.dims.x; }
+  int64_t color(int64_t i) const { return 255 * i / info_.dims.x; }
   uint32_t digits(int64_t i) const { return digits_[static_cast<size_t>(i)]; }
   /// The places in which every coordinate of lo .. hi has the digit 1: the ends of the range agree from some
   /// place on.

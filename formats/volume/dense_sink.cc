@@ -16,7 +16,7 @@ constexpr size_t buffer_bytes = size_t{1} << 20;
 }  // namespace
 
 SampleLayout storage_layout(const VolumeInfo& info, bool halves) {
-  if (is_colour(info.format)) return {SampleType::u8, attributes(info.format), false};
+  if (is_color(info.format)) return {SampleType::u8, attributes(info.format), false};
   if (is_wide(info.sample_type)) return {info.sample_type, 1, false};
   if (info.format == VoxelFormat::float32)
     return {halves && info.sample_type == SampleType::f16 ? SampleType::f16 : SampleType::f32, 1, false};

@@ -38,7 +38,7 @@ class DicomSeries final : public SlicedSource {
     info.description = first.description;
     info.parts = plan.parts;
     for (const DicomHeader& h : plan.files) info.files.push_back(h.path);
-    info.is_labels = options.labels && !is_colour(info.format);
+    info.is_labels = options.labels && !is_color(info.format);
     if (!checked_voxels(info.dims)) return bad_input(name, "series has too many voxels");
     VOX_CHECK(series->scale(name, options, ctx));
     VOX_CHECK(series->padding(name, options, ctx));
@@ -87,7 +87,7 @@ class DicomSeries final : public SlicedSource {
       const DicomFrame& frame = plan_.frame(slice);
       if (!first) first = &frame;
       if (frame.slope == first->slope && frame.intercept == first->intercept) continue;
-      if (is_colour(info_.format)) break;
+      if (is_color(info_.format)) break;
       if (!options.real_values && !options.any_part)
         return bad_input(
             plan_.header(slice).path,
@@ -102,7 +102,7 @@ class DicomSeries final : public SlicedSource {
       info_.sample_type = SampleType::f32;
       return {};
     }
-    if (is_colour(info_.format)) return {};
+    if (is_color(info_.format)) return {};
     info_.slope = first->slope;
     info_.intercept = first->intercept;
     return {};
@@ -111,7 +111,7 @@ class DicomSeries final : public SlicedSource {
   /// What the file says stands for nothing measured.
   Status padding(const std::string& name, const OpenOptions& options, Context& ctx) {
     const DicomHeader& first = plan_.files.front();
-    if (!first.padding || is_colour(info_.format)) return {};
+    if (!first.padding || is_color(info_.format)) return {};
     if (real_ || is_wide(info_.sample_type) || first.is_float) {
       ctx.note(fmt::format("{}: that {} stands for nothing measured is dropped", name, *first.padding));
       return {};
@@ -196,7 +196,7 @@ class DicomSeries final : public SlicedSource {
   Status find_filler(const std::string& name, Context& ctx) {
     const auto gaps = std::count_if(plan_.slices.begin(), plan_.slices.end(),
                                     [](const DicomSlice& s) { return s.file == DicomSlice::none; });
-    if (gaps == 0 || is_colour(info_.format)) return {};
+    if (gaps == 0 || is_color(info_.format)) return {};
     double least = info_.fill.value_or(std::numeric_limits<double>::infinity());
     if (!info_.fill) {
       const int64_t slice_bytes = info_.dims.x * info_.dims.y * voxel_bytes(info_.format);

@@ -78,11 +78,11 @@ Result<std::shared_ptr<const DicomPalette>> palette_of(const DicomData& data, co
     if (entries.size() < (packed ? (count + 1) / 2 : count) || (table[2] != 8 && table[2] != 16))
       return bad_input(path, fmt::format("palette of {} entries of {} bits: its data are {} words", count,
                                          table[2], entries.size()));
-    palette->colours.resize(count);
+    palette->colors.resize(count);
     palette->first = is_signed ? static_cast<int16_t>(table[1]) : table[1];
     for (size_t i = 0; i < count; ++i) {
       const unsigned word = packed ? entries[i / 2] >> (i % 2 * 8) & 0xff : entries[i];
-      palette->colours[i][c] = static_cast<uint16_t>(bytes ? (word & 0xff) * 257 : word);
+      palette->colors[i][c] = static_cast<uint16_t>(bytes ? (word & 0xff) * 257 : word);
     }
   }
   return palette;

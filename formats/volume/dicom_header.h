@@ -30,7 +30,7 @@ struct DicomFrame {
 /// Colours of indices, 16 bits each.
 struct DicomPalette {
   int first = 0;  ///< the index of the first entry
-  std::vector<std::array<uint16_t, 3>> colours;
+  std::vector<std::array<uint16_t, 3>> colors;
 };
 
 /// What a file says of all its frames.

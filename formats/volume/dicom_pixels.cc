@@ -203,9 +203,9 @@ void look_up(const DicomHeader& h, std::vector<std::byte>& pixels) {
     int value = std::to_integer<int>(pixels[i * bytes]);
     if (bytes == 2) value |= std::to_integer<int>(pixels[i * 2 + 1]) << 8;
     if (h.is_signed) value = bytes == 2 ? static_cast<int16_t>(value) : static_cast<int8_t>(value);
-    const int last = static_cast<int>(palette.colours.size()) - 1;
-    const auto& colour = palette.colours[static_cast<size_t>(std::clamp(value - palette.first, 0, last))];
-    for (size_t c = 0; c < 3; ++c) rgb[3 * i + c] = static_cast<std::byte>(colour[c] >> 8);
+    const int last = static_cast<int>(palette.colors.size()) - 1;
+    const auto& color = palette.colors[static_cast<size_t>(std::clamp(value - palette.first, 0, last))];
+    for (size_t c = 0; c < 3; ++c) rgb[3 * i + c] = static_cast<std::byte>(color[c] >> 8);
   }
   pixels = std::move(rgb);
 }
@@ -216,11 +216,11 @@ Result<DicomPixels> dicom_pixels(const DicomHeader& h, const OpenOptions& option
   if (h.rows < 1 || h.columns < 1) return bad_input(h.path, "image without pixels");
   const bool grey = h.samples == 1 && h.photometric.starts_with("MONOCHROME");
   const bool indices = h.samples == 1 && h.palette != nullptr;
-  const bool compressed_colour = h.encapsulated && (h.photometric == "YBR_FULL_422" ||
-                                                    h.photometric == "YBR_RCT" || h.photometric == "YBR_ICT");
-  const bool colour = h.samples == 3 && h.bits_allocated == 8 && h.bits_stored == 8 &&
-                      (h.photometric == "RGB" || h.photometric == "YBR_FULL" || compressed_colour);
-  if (!grey && !indices && !colour)
+  const bool compressed_color = h.encapsulated && (h.photometric == "YBR_FULL_422" ||
+                                                   h.photometric == "YBR_RCT" || h.photometric == "YBR_ICT");
+  const bool color = h.samples == 3 && h.bits_allocated == 8 && h.bits_stored == 8 &&
+                     (h.photometric == "RGB" || h.photometric == "YBR_FULL" || compressed_color);
+  if (!grey && !indices && !color)
     return bad_input(h.path,
                      fmt::format("photometric interpretation {} with {} samples a pixel of {} bits: "
                                  "expected MONOCHROME1, MONOCHROME2 or PALETTE COLOR with 1, or RGB or "
@@ -257,10 +257,10 @@ Result<DicomPixels> dicom_pixels(const DicomHeader& h, const OpenOptions& option
     return fail(ErrorCode::limit, h.path,
                 fmt::format("one slice takes {} bytes: more than half of --max-memory", bytes));
   DicomPixels pixels;
-  if (colour || (indices && !options.labels)) {
+  if (color || (indices && !options.labels)) {
     pixels.components = 3;
     pixels.format = VoxelFormat::rgb24;
-    pixels.colours = indices;
+    pixels.colors = indices;
     return pixels;
   }
   switch (h.bits_allocated) {
@@ -295,7 +295,7 @@ Status read_dicom_samples(const DicomHeader& h, const DicomFrame& frame, const D
   if (!whole && h.bits_allocated == 8) take_bits<uint8_t>(h, samples);
   if (!whole && h.bits_allocated == 16) take_bits<uint16_t>(h, samples);
   if (!whole && h.bits_allocated == 32) take_bits<uint32_t>(h, samples);
-  if (pixels.colours) {
+  if (pixels.colors) {
     look_up(h, samples);
   } else if (pixels.components == 3) {
     // Run-length codes are unpacked pixel by pixel, and so are those of JPEG.

@@ -14,7 +14,7 @@ struct DicomPixels {
   SampleType type = SampleType::u8;  ///< of samples, once bits that are no part of them are gone
   int components = 1;                ///< of what `read_dicom_samples` gives: 3 for colours
   VoxelFormat format = VoxelFormat::density8;
-  bool colours = false;  ///< indices are looked up in the palette
+  bool colors = false;  ///< indices are looked up in the palette
 };
 
 /// Errors: ErrorCode::input, naming what is not read; ErrorCode::limit where a frame takes more than half of

@@ -74,7 +74,7 @@ std::vector<std::string> not_held(const VolumeInfo& info, const Holds& holds) {
   if (info.world != World::unknown && !holds.world)
     what.push_back(fmt::format("the world {}", name(info.world)));
   if (info.unit != Unit::unknown && !holds.unit) what.push_back(fmt::format("the unit {}", name(info.unit)));
-  if ((info.slope != 1 || info.intercept != 0) && !holds.scale && !is_colour(info.format))
+  if ((info.slope != 1 || info.intercept != 0) && !holds.scale && !is_color(info.format))
     what.push_back(fmt::format("the slope {} and the intercept {}", info.slope, info.intercept));
   if (info.is_labels && !holds.labels) what.push_back("that values are labels");
   if (info.fill && !holds.fill)

@@ -73,12 +73,12 @@ std::optional<PixelKind> pixel_kind(const ImageSpec& spec, std::optional<int64_t
       return std::nullopt;
   }
   kind.type = type;
-  const bool colour =
+  const bool color =
       (spec.nchannels == 3 || spec.nchannels == 4) && kind.layout.type == SampleType::u8 && !channel;
   if (spec.deep || spec.depth > 1) return std::nullopt;
   kind.first = static_cast<int>(channel.value_or(0));
-  kind.layout.components = colour ? spec.nchannels : 1;
-  kind.format = !colour               ? scalar_format(kind.layout.type)
+  kind.layout.components = color ? spec.nchannels : 1;
+  kind.format = !color                ? scalar_format(kind.layout.type)
                 : spec.nchannels == 3 ? VoxelFormat::rgb24
                                       : VoxelFormat::rgba32;
   return kind;
@@ -112,7 +112,7 @@ class ImageStack : public SlicedSource {
     info.dims = {stack->spec_.width, stack->spec_.height, slices};
     info.format = stack->kind_.format;
     info.sample_type = stack->kind_.layout.type;
-    info.is_labels = options.labels && !is_colour(info.format);
+    info.is_labels = options.labels && !is_color(info.format);
     if (!checked_voxels(info.dims)) return bad_input(name, "stack has too many voxels");
     if (stack->spec_.x != 0 || stack->spec_.y != 0)
       ctx.note(fmt::format("{}: that its pixels begin at {}, {} is dropped", name, stack->spec_.x,
@@ -143,7 +143,7 @@ class ImageStack : public SlicedSource {
   Status choose(const OpenOptions& options) {
     const std::string& name = files_.front();
     const auto kind = pixel_kind(spec_, {});
-    const bool one = spec_.nchannels == 1 || (kind && is_colour(kind->format) && !options.channel);
+    const bool one = spec_.nchannels == 1 || (kind && is_color(kind->format) && !options.channel);
     if (!kind || (!one && !options.channel && !options.any_part))
       return bad_input(
           name,

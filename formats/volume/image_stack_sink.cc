@@ -47,7 +47,7 @@ bool fits_32_bits(const VolumeInfo& info, bool is_signed) {
 /// it.
 std::optional<SampleType> stored_type(const std::string& format, const VolumeInfo& info) {
   const bool png = format == "png", tiff = format == "tiff", exr = format == "openexr";
-  if (is_colour(info.format)) return png || tiff ? std::optional(SampleType::u8) : std::nullopt;
+  if (is_color(info.format)) return png || tiff ? std::optional(SampleType::u8) : std::nullopt;
   if (is_wide(info.sample_type)) {
     const bool is_signed = info.sample_type == SampleType::i32 || info.sample_type == SampleType::i64;
     const SampleType narrow = is_signed ? SampleType::i32 : SampleType::u32;
@@ -121,7 +121,7 @@ class ImageStackSink final : public VolumeSink {
           ErrorCode::usage, text,
           fmt::format("images with this ending cannot hold {}{}: expected .tif (all formats), .png (8 and 16 "
                       "bits, colours) or .exr (FLOAT32)",
-                      is_wide(info.sample_type) && !is_colour(info.format)
+                      is_wide(info.sample_type) && !is_color(info.format)
                           ? std::string(voxkit::name(info.sample_type)) + " as "
                       : info.bias() ? "signed "
                                     : "",

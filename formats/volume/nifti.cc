@@ -99,11 +99,11 @@ Result<Volume> choose_volume(const Header& header, const OpenOptions& options) {
     return header.wrong("too many voxels: expected at most 2^62");
 
   // Colours as planes: the fifth dimension is that of the numbers of a voxel.
-  const bool says_colours = header.intent == 0 || header.intent == NIFTI_INTENT_VECTOR ||
-                            header.intent == NIFTI_INTENT_RGB_VECTOR ||
-                            header.intent == NIFTI_INTENT_RGBA_VECTOR;
+  const bool says_colors = header.intent == 0 || header.intent == NIFTI_INTENT_VECTOR ||
+                           header.intent == NIFTI_INTENT_RGB_VECTOR ||
+                           header.intent == NIFTI_INTENT_RGBA_VECTOR;
   const bool planes = (sides[5] == 3 || sides[5] == 4) && volume.layout.type == SampleType::u8 &&
-                      volume.layout.components == 1 && says_colours && !options.channel;
+                      volume.layout.components == 1 && says_colors && !options.channel;
   info.sample_type = volume.layout.type;
   if (planes) volume.layout.components = static_cast<int>(sides[5]);
   info.format = volume.layout.components == 4   ? VoxelFormat::rgba32

@@ -244,7 +244,7 @@ int16_t datatype_of(const SampleLayout& layout) {
 
 void read_meaning(const Header& header, VolumeInfo& info, Context& ctx) {
   std::vector<std::string> dropped;
-  if (header.slope != 0 && !is_colour(info.format)) {
+  if (header.slope != 0 && !is_color(info.format)) {
     if (std::isfinite(header.slope) && std::isfinite(header.intercept)) {
       info.slope = header.slope;
       info.intercept = header.intercept;
@@ -259,10 +259,10 @@ void read_meaning(const Header& header, VolumeInfo& info, Context& ctx) {
   }
   info.description = header.description;
   const bool labels = header.intent == NIFTI_INTENT_LABEL || header.intent == NIFTI_INTENT_NEURONAME;
-  const bool colours = header.intent == NIFTI_INTENT_RGB_VECTOR ||
-                       header.intent == NIFTI_INTENT_RGBA_VECTOR || header.intent == NIFTI_INTENT_VECTOR;
-  if (labels && !is_colour(info.format)) info.is_labels = true;
-  if (header.intent != 0 && !labels && !(colours && is_colour(info.format)))
+  const bool colors = header.intent == NIFTI_INTENT_RGB_VECTOR || header.intent == NIFTI_INTENT_RGBA_VECTOR ||
+                      header.intent == NIFTI_INTENT_VECTOR;
+  if (labels && !is_color(info.format)) info.is_labels = true;
+  if (header.intent != 0 && !labels && !(colors && is_color(info.format)))
     dropped.push_back(fmt::format("the intent code {} ({})", header.intent,
                                   name_of(intents, header.intent, "another one")));
   if (!header.intent_name.empty())

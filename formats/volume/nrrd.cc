@@ -209,7 +209,7 @@ SourceResult open_nrrd(const std::string& path, std::unique_ptr<InputStream> str
   VOX_TRY(const Header header, nrrd::read_header(*stream));
   VOX_TRY(const Nrrd facts, nrrd::interpret(header, options, ctx));
   VOX_TRY(auto source, open_header(path, std::move(stream), header, facts, options, ctx));
-  if (!facts.fill || is_colour(source->info().format)) return source;
+  if (!facts.fill || is_color(source->info().format)) return source;
   const VolumeInfo& info = source->info();  // how wide integers are held is known now
   const bool is_float = info.format == VoxelFormat::float32;
   const double stored = is_float ? *facts.fill : info.stored(*facts.fill);

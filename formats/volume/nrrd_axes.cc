@@ -16,7 +16,7 @@ namespace {
 
 constexpr int most_axes = 16;  // as the format's own library has it
 
-enum class Role { space, colours, time, channels, one };
+enum class Role { space, colors, time, channels, one };
 
 struct SpaceName {
   std::string_view name, short_name;
@@ -101,9 +101,9 @@ Result<Role> role_of(const Header& header, const std::vector<double>& direction,
 /// Of an axis without direction that has a kind which is not of space.
 Role role_of(const std::string& kind, int64_t size, SampleType type) {
   if (size == 1) return Role::one;
-  const bool colours = ((kind == "rgb-color" || kind == "3-color") && size == 3) ||
-                       ((kind == "rgba-color" || kind == "4-color") && size == 4);
-  if (colours && type == SampleType::u8) return Role::colours;
+  const bool colors = ((kind == "rgb-color" || kind == "3-color") && size == 3) ||
+                      ((kind == "rgba-color" || kind == "4-color") && size == 4);
+  if (colors && type == SampleType::u8) return Role::colors;
   return kind == "time" || kind == "list" || kind == "point" ? Role::time : Role::channels;
 }
 
@@ -120,11 +120,11 @@ Result<std::vector<Role>> roles_of(const Header& header, const Axes& axes, const
     } else if (!of_space) {
       roles[i] = role_of(kind, sizes[i], type);
     } else if (axes.directed) {  // said to have no direction, and no more
-      roles[i] = sizes[i] == 1 ? Role::one : i > 0 ? Role::time : is_four(0) ? Role::colours : Role::channels;
+      roles[i] = sizes[i] == 1 ? Role::one : i > 0 ? Role::time : is_four(0) ? Role::colors : Role::channels;
     }
   }
   const bool nothing_said = !axes.directed && !header.find("kinds");
-  if (nothing_said && count == 4 && is_four(0)) roles[0] = Role::colours;
+  if (nothing_said && count == 4 && is_four(0)) roles[0] = Role::colors;
   const auto number_of = [&](Role role) { return std::count(roles.begin(), roles.end(), role); };
   const auto last_of = [&](Role role) {
     return roles.rend() - std::find(roles.rbegin(), roles.rend(), role) - 1;
@@ -140,7 +140,7 @@ Result<std::vector<Role>> roles_of(const Header& header, const Axes& axes, const
     if (axes.kinds[other] == "time") other = static_cast<size_t>(last_of(Role::time));
     roles[other] = Role::channels;
   }
-  if (number_of(Role::time) > 1 || number_of(Role::channels) > 1 || number_of(Role::colours) > 1)
+  if (number_of(Role::time) > 1 || number_of(Role::channels) > 1 || number_of(Role::colors) > 1)
     return header.wrong(header.find("kinds") ? "kinds" : "dimension",
                         "three axes of space, and one each of colours, of time or a list, of channels");
   return roles;
@@ -241,7 +241,7 @@ Status parse_keys(const Header& header, Nrrd& nrrd, std::vector<std::string>& dr
       if (!nrrd.fill) return wrong("a number");
     } else if (key == labels_key) {
       if (text != "yes") return wrong("yes");
-      info.is_labels = !is_colour(info.format);
+      info.is_labels = !is_color(info.format);
     } else if (key == space_key) {
       const auto code = number<uint8_t>(text);
       if (!code) return wrong("a number of at most 255");
@@ -331,7 +331,7 @@ Result<Nrrd> interpret(const Header& header, const OpenOptions& options, Context
     if (roles[i] == Role::space) {
       info.dims[static_cast<int>(spatial.size())] = size;
       spatial.push_back(i);
-    } else if (roles[i] == Role::colours) {
+    } else if (roles[i] == Role::colors) {
       components = static_cast<int>(size);
       nrrd.strides.component = static_cast<int64_t>(steps[i] * bytes);
     } else if (roles[i] == Role::time) {

@@ -50,13 +50,13 @@ std::string text(const Affine::Vector& v) {
 }  // namespace
 
 std::string header_text(const VolumeInfo& info, const SampleLayout& layout, const std::string& data_file) {
-  const bool coloured = is_colour(info.format);
+  const bool colored = is_color(info.format);
   std::string all = "NRRD0005\n";
   const auto line = [&](std::string_view field, const std::string& value) {
     all += fmt::format("{}: {}\n", field, value);
   };
   line("type", std::string(type_name(layout.type)));
-  line("dimension", coloured ? "4" : "3");
+  line("dimension", colored ? "4" : "3");
   const std::string_view space = space_name(info.world);
   if (space.empty()) {
     line("space dimension", "3");
@@ -64,12 +64,12 @@ std::string header_text(const VolumeInfo& info, const SampleLayout& layout, cons
     line("space", std::string(space));
   }
   const std::string sizes = fmt::format("{} {} {}", info.dims.x, info.dims.y, info.dims.z);
-  line("sizes", coloured ? fmt::format("{} {}", layout.components, sizes) : sizes);
+  line("sizes", colored ? fmt::format("{} {}", layout.components, sizes) : sizes);
   // Not `spacings`, which the format does not allow beside an origin in space.
   const auto& axes = info.affine.axes;
   line("space directions",
-       fmt::format("{}{} {} {}", coloured ? "none " : "", text(axes[0]), text(axes[1]), text(axes[2])));
-  if (coloured)
+       fmt::format("{}{} {} {}", colored ? "none " : "", text(axes[0]), text(axes[1]), text(axes[2])));
+  if (colored)
     line("kinds",
          fmt::format("{} domain domain domain", layout.components == 4 ? "RGBA-color" : "RGB-color"));
   if (sample_bytes(layout.type) > 1) line("endian", "little");
@@ -85,7 +85,7 @@ std::string header_text(const VolumeInfo& info, const SampleLayout& layout, cons
   if (info.slope != 1) key(slope_key, info.slope);
   if (info.intercept != 0) key(intercept_key, info.intercept);
   if (info.format == VoxelFormat::bitmap) key(format_key, "BITMAP");
-  if (info.fill && !coloured)
+  if (info.fill && !colored)
     key(fill_key, info.format == VoxelFormat::float32 ? *info.fill : info.sample(*info.fill));
   if (info.is_labels) key(labels_key, "yes");
   if (info.space_code != 0) key(space_key, info.space_code);

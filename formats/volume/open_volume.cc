@@ -124,7 +124,7 @@ Result<std::unique_ptr<VolumeSource>> open_volume(const std::string& name, const
                                                   Context& ctx) {
   VOX_TRY(auto source, open_as_it_is(name, options, ctx));
   VOX_CHECK(check_not_written(source->info(), options));
-  if (options.labels && !is_colour(source->info().format)) source->set_labels();
+  if (options.labels && !is_color(source->info().format)) source->set_labels();
   return source;
 }
 
@@ -134,7 +134,7 @@ Result<std::unique_ptr<VolumeSink>> create_volume(const std::string& name, const
     return fail(ErrorCode::internal, name, "the volume to write has no voxels, or too many");
   if (name == "-") return create_nrrd(name, info, force, ctx);
   const Kind kind = kind_of(name);
-  if (is_wide(info.sample_type) && info.format != VoxelFormat::float32 && !is_colour(info.format) &&
+  if (is_wide(info.sample_type) && info.format != VoxelFormat::float32 && !is_color(info.format) &&
       (kind == Kind::vdb || kind == Kind::image))
     return fail(
         ErrorCode::usage, name,

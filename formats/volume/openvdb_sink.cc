@@ -73,8 +73,8 @@ class VdbSink : public VolumeSink {
       : info_(info), file_(std::move(file)), memory_(*memory), grid_(Grid::create()) {
     grid_->setTransform(transform_of(info));
     set_metadata(*grid_, info);
-    grid_->setName(is_colour(info.format) ? "color" : "density");
-    if (!is_colour(info.format)) grid_->setGridClass(openvdb::GRID_FOG_VOLUME);
+    grid_->setName(is_color(info.format) ? "color" : "density");
+    if (!is_color(info.format)) grid_->setGridClass(openvdb::GRID_FOG_VOLUME);
     grid_->insertMeta(dims_key, openvdb::Vec3IMetadata(openvdb::Vec3i(static_cast<int>(info.dims.x),
                                                                       static_cast<int>(info.dims.y),
                                                                       static_cast<int>(info.dims.z))));
@@ -237,7 +237,7 @@ Status check_grid(const std::string& path, const VolumeInfo& info) {
   for (int axis = 0; axis < 3; ++axis)
     if (info.dims[axis] > INT32_MAX)
       return fail(ErrorCode::usage, path, "OpenVDB grids have at most 2^31 - 1 voxels a side");
-  if (is_wide(info.sample_type) && !is_colour(info.format) && !fits_int64(info))
+  if (is_wide(info.sample_type) && !is_color(info.format) && !fits_int64(info))
     return fail(ErrorCode::usage, path,
                 "OpenVDB grids hold integers below 2^63: expected others, or --type f32");
   if (path == "-") return bad_usage("an OpenVDB file cannot be written to standard output: name a file");
@@ -271,7 +271,7 @@ SinkResult create_vdb_sink(const std::string& path, const VolumeInfo& info, bool
   VOX_TRY(auto file, OutputFile::create(path, force));
   try {
     register_vdb_types();
-    if (is_colour(info.format))
+    if (is_color(info.format))
       return std::make_unique<VdbSink<openvdb::Vec3SGrid>>(info, std::move(file), ctx.memory);
     if (info.sample_type == SampleType::i32 && is_wide(info.sample_type))
       return std::make_unique<VdbSink<openvdb::Int32Grid>>(info, std::move(file), ctx.memory);

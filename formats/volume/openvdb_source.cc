@@ -56,7 +56,7 @@ struct Integers {
 };
 /// Vectors from 0 to `full`; what is inactive is void, whatever colour it has.
 template <class Grid_>
-struct Colour {
+struct Color {
   using Grid = Grid_;
   using Value = typename Grid::ValueType;
   static constexpr bool integer = std::is_integral_v<typename Value::value_type>;
@@ -227,8 +227,8 @@ class VdbSource final : public VdbVolume {
   Status hold(const std::string& path, const OpenOptions& options, Context& ctx) {
     using Value = typename Grid::ValueType;
     VolumeInfo& info = info_;
-    info.is_labels = options.labels && !is_colour(info.format);
-    if constexpr (is_colour(Kind::format)) {
+    info.is_labels = options.labels && !is_color(info.format);
+    if constexpr (is_color(Kind::format)) {
       info.sample_type = SampleType::u8;
       bool outside = false;
       each_value([&](const Value& value, bool active) {
@@ -294,7 +294,7 @@ class VdbSource final : public VdbVolume {
     info.unit = parse_unit(text_of(unit_key)).value_or(Unit::unknown);
     info.description = first_line(text_of(description_key));
     double slope = 1, intercept = 0;
-    if (!is_colour(info.format) &&
+    if (!is_color(info.format) &&
         std::sscanf(text_of(scale_key).c_str(), "%lf %lf", &slope, &intercept) == 2 && std::isfinite(slope) &&
         std::isfinite(intercept))
       info.slope = slope, info.intercept = intercept;
@@ -381,8 +381,8 @@ SourceResult volume_of(const std::string& path, const openvdb::GridBase::Ptr& gr
   if (grid->isType<openvdb::Int64Grid>())
     return source_of<Integers<openvdb::Int64Grid>>(path, grid, options, ctx);
   if (grid->isType<openvdb::Vec3IGrid>())
-    return source_of<Colour<openvdb::Vec3IGrid>>(path, grid, options, ctx);
-  return source_of<Colour<openvdb::Vec3SGrid>>(path, grid, options, ctx);
+    return source_of<Color<openvdb::Vec3IGrid>>(path, grid, options, ctx);
+  return source_of<Color<openvdb::Vec3SGrid>>(path, grid, options, ctx);
 }
 
 }  // namespace

@@ -65,7 +65,7 @@ class PngStack final : public SlicedSource {
     info.dims = {head.width, head.height, std::ssize(stack->files_)};
     info.format = stack->kind_.format;
     info.sample_type = stack->kind_.type;
-    info.is_labels = options.labels && !is_colour(info.format);
+    info.is_labels = options.labels && !is_color(info.format);
     if (!checked_voxels(info.dims)) return bad_input(name, "stack has too many voxels");
     if (head.transparent_value && stack->kind_.from != Kind::From::transparent_rgb)
       ctx.note(name + ": that one of its values means void is dropped");
@@ -117,8 +117,8 @@ class PngStack final : public SlicedSource {
                SampleType::u8, 0};
       return {};
     }
-    const bool colour = head_.samples >= 3 && head_.bits == 8;
-    if (head_.samples == 1 || (colour && !options.channel)) {
+    const bool color = head_.samples >= 3 && head_.bits == 8;
+    if (head_.samples == 1 || (color && !options.channel)) {
       VOX_CHECK(only_part(files_.front(), options));
       if (head_.samples == 1) return {};
       const bool alpha = head_.samples == 4 || head_.transparent_value;
@@ -182,24 +182,24 @@ class PngStack final : public SlicedSource {
                       static_cast<size_t>(sample));
           break;
         case From::grey_palette:
-          out[i] = static_cast<std::byte>(colour(head, in[i])[0]);
+          out[i] = static_cast<std::byte>(color(head, in[i])[0]);
           break;
         case From::rgb_palette:
-          std::memcpy(out + 3 * i, colour(head, in[i]).data(), 3);
+          std::memcpy(out + 3 * i, color(head, in[i]).data(), 3);
           break;
         case From::rgba_palette:
-          std::memcpy(out + 4 * i, colour(head, in[i]).data(), 4);
+          std::memcpy(out + 4 * i, color(head, in[i]).data(), 4);
           break;
         case From::transparent_rgb: {
           std::memcpy(out + 4 * i, in + 3 * i, 3);
-          const bool is_void = std::memcmp(in + 3 * i, head.void_colour.data(), 3) == 0;
+          const bool is_void = std::memcmp(in + 3 * i, head.void_color.data(), 3) == 0;
           out[4 * i + 3] = is_void ? std::byte{0} : std::byte{255};
           break;
         }
       }
     }
   }
-  static const std::array<uint8_t, 4>& colour(const PngHead& head, std::byte index) {
+  static const std::array<uint8_t, 4>& color(const PngHead& head, std::byte index) {
     return head.palette[std::to_integer<size_t>(index)];
   }
 

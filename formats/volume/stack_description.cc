@@ -256,7 +256,7 @@ std::string stack_description(const VolumeInfo& info) {
   const auto spacing = info.affine.spacing();
   std::string text = fmt::format("ImageJ=1.53t\nimages=1\nspacing={}\n", spacing[2]);
   if (info.unit != Unit::unknown) text += fmt::format("unit={}\n", name(info.unit));
-  if (scaled && !is_colour(info.format))
+  if (scaled && !is_color(info.format))
     text += fmt::format("cf=0\nc0={}\nc1={}\n", info.intercept, info.slope);
   text += fmt::format("voxkit_spacing={} {} {}\n", spacing[0], spacing[1], spacing[2]);
   if (info.affine.is_plain()) {

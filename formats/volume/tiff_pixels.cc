@@ -63,23 +63,22 @@ const char* photometric_text(int photometric) {
 /// The entries of a palette as 16 bits, reds, greens and blues one after the other. Some writers put 8 bits.
 std::vector<uint16_t> palette_of(const TiffFile& file, const TiffPage& page) {
   const size_t entries = size_t{1} << page.bits;
-  std::vector<uint16_t> colours(3 * entries);
-  for (size_t i = 0; i < colours.size(); ++i)
-    colours[i] = static_cast<uint16_t>(file.number(page.colours, i));
-  if (std::all_of(colours.begin(), colours.end(), [](uint16_t v) { return v < 256; }))
-    for (uint16_t& v : colours) v = static_cast<uint16_t>(v * 257);
-  return colours;
+  std::vector<uint16_t> colors(3 * entries);
+  for (size_t i = 0; i < colors.size(); ++i) colors[i] = static_cast<uint16_t>(file.number(page.colors, i));
+  if (std::all_of(colors.begin(), colors.end(), [](uint16_t v) { return v < 256; }))
+    for (uint16_t& v : colors) v = static_cast<uint16_t>(v * 257);
+  return colors;
 }
 
 struct PaletteKind {
   bool grey = true, bytes = true;  ///< three times the same; 8 bits say all
 };
-PaletteKind kind_of(const std::vector<uint16_t>& colours) {
-  const size_t entries = colours.size() / 3;
+PaletteKind kind_of(const std::vector<uint16_t>& colors) {
+  const size_t entries = colors.size() / 3;
   PaletteKind kind;
   for (size_t i = 0; i < entries; ++i)
-    kind.grey &= colours[i] == colours[entries + i] && colours[i] == colours[2 * entries + i];
-  for (const uint16_t v : colours) kind.bytes &= (v & 0xff) == 0 || (v & 0xff) == v >> 8;
+    kind.grey &= colors[i] == colors[entries + i] && colors[i] == colors[2 * entries + i];
+  for (const uint16_t v : colors) kind.bytes &= (v & 0xff) == 0 || (v & 0xff) == v >> 8;
   return kind;
 }
 
@@ -208,25 +207,25 @@ class Reader {
 /// Indices become what the palette has for them.
 void look_up(const TiffFile& file, const TiffPage& page, const TiffPixels& pixels, const std::byte* indices,
              int64_t count, std::byte* out) {
-  const std::vector<uint16_t> colours = palette_of(file, page);
-  const size_t entries = colours.size() / 3;
+  const std::vector<uint16_t> colors = palette_of(file, page);
+  const size_t entries = colors.size() / 3;
   for (int64_t i = 0; i < count; ++i) {
     size_t index = std::to_integer<size_t>(indices[page.bits > 8 ? 2 * i : i]);
     if (page.bits > 8) index |= std::to_integer<size_t>(indices[2 * i + 1]) << 8;
     if (pixels.layout.components == 3) {
       for (size_t c = 0; c < 3; ++c)
-        out[3 * i + static_cast<int64_t>(c)] = static_cast<std::byte>(colours[c * entries + index] >> 8);
+        out[3 * i + static_cast<int64_t>(c)] = static_cast<std::byte>(colors[c * entries + index] >> 8);
     } else if (pixels.layout.type == SampleType::u16) {
-      std::memcpy(out + 2 * i, &colours[index], 2);
+      std::memcpy(out + 2 * i, &colors[index], 2);
     } else {
-      out[i] = static_cast<std::byte>(colours[index] >> 8);
+      out[i] = static_cast<std::byte>(colors[index] >> 8);
     }
   }
 }
 
 }  // namespace
 
-bool is_tiff_colour(const TiffPage& page) {
+bool is_tiff_color(const TiffPage& page) {
   return (page.photometric == rgb || page.photometric == ycbcr) && page.bits == 8 &&
          page.sample_format != is_signed && (page.samples == 3 || page.samples == 4);
 }
@@ -287,18 +286,18 @@ Result<TiffPixels> tiff_pixels(const TiffFile& file, const TiffPage& page, int s
       if (pixels.by_library) return refused("has a palette in a compression whose indices are not read");
       return pixels;
     }
-    if (page.colours.count != uint64_t{3} << page.bits || page.colours.type != 3)
+    if (page.colors.count != uint64_t{3} << page.bits || page.colors.type != 3)
       return refused("has a palette of the wrong size");
     pixels.layout = {SampleType::u8, 3, false};
     const PaletteKind kind = kind_of(palette_of(file, page));
-    pixels.colours = !pixels.by_library;
+    pixels.colors = !pixels.by_library;
     pixels.sample_type = kind.bytes ? SampleType::u8 : SampleType::u16;
     if (kind.grey && !pixels.by_library) pixels.layout = {pixels.sample_type, 1, false};
     pixels.format = pixels.layout.components == 3 ? VoxelFormat::rgb24 : scalar_format(pixels.sample_type);
     if (pixels.layout.components == 3) pixels.sample_type = SampleType::u8;
     return pixels;
   }
-  if (is_tiff_colour(page) && !(page.photometric == ycbcr && !jpeg) && !options.channel) {
+  if (is_tiff_color(page) && !(page.photometric == ycbcr && !jpeg) && !options.channel) {
     pixels.first = 0;
     pixels.count = pixels.layout.components = page.samples;
     pixels.format = page.samples == 3 ? VoxelFormat::rgb24 : VoxelFormat::rgba32;
@@ -316,7 +315,7 @@ Status read_tiff_rows(const TiffFile& file, const TiffPage& page, const TiffPixe
                       int64_t y0, int64_t y1, std::byte* out, uint64_t moved) {
   const int64_t count = (y1 - y0) * page.width;
   Reader reader(file, page, pixels, moved);
-  if (!pixels.colours) {
+  if (!pixels.colors) {
     VOX_CHECK(reader.read(z, y0, y1, out));
   } else {
     std::vector<std::byte> indices(static_cast<size_t>(count * (page.bits > 8 ? 2 : 1)));

@@ -17,13 +17,13 @@ struct TiffPixels {
   VoxelFormat format = VoxelFormat::density8;
   SampleType sample_type = SampleType::u8;
   int first = 0, count = 1;    ///< samples of a pixel that are taken
-  bool colours = false;        ///< indices are looked up in the page's palette: grey, or RGB
+  bool colors = false;         ///< indices are looked up in the page's palette: grey, or RGB
   bool divides_alpha = false;  ///< colours are stored multiplied by alpha
   bool by_library = false;     ///< OpenImageIO unpacks it
 };
 
 /// Whether the samples of a pixel are one colour, of 8 bits each, rather than channels.
-bool is_tiff_colour(const TiffPage& page);
+bool is_tiff_color(const TiffPage& page);
 
 /// What the pixels of a page become; of samples that are channels, number `sample`. Errors:
 /// ErrorCode::input, naming what is not read.

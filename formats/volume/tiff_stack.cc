@@ -165,7 +165,7 @@ class TiffStack final : public SlicedSource {
     info_.dims = {page_.width, page_.height, std::ssize(slices_)};
     info_.format = pixels_.format;
     info_.sample_type = pixels_.sample_type;
-    info_.is_labels = (options_.labels || said.is_labels) && !is_colour(info_.format);
+    info_.is_labels = (options_.labels || said.is_labels) && !is_color(info_.format);
     info_.world = said.world;
     info_.slope = said.slope;
     info_.intercept = said.intercept;
@@ -187,9 +187,9 @@ class TiffStack final : public SlicedSource {
   Status choose(const StackDescription& said) {
     const std::string& name = files_.front();
     info_.parts = said.parts;
-    const bool colour = page_.photometric == 3 || is_tiff_colour(page_);
+    const bool color = page_.photometric == 3 || is_tiff_color(page_);
     // Samples of a pixel are channels where they are no colour, or one of them is asked for.
-    const bool of_samples = page_.samples > 1 && (!colour || (options_.channel && said.channels == 1));
+    const bool of_samples = page_.samples > 1 && (!color || (options_.channel && said.channels == 1));
     const int64_t samples = of_samples ? page_.samples : 1;
     const int64_t channels = said.channels * samples;
     OpenOptions options = options_;

@@ -179,7 +179,7 @@ Remarks remarks_of(const Mesh& mesh, bool emission) {
     emitting += m.emits();
     if (m.alpha_mode == AlphaMode::blend)
       blended += m.color.a < 1 || faint_corners ||
-                 (m.texture >= 0 && mesh.textures[static_cast<size_t>(m.texture)].has_alpha);
+                 (m.picture >= 0 && mesh.pictures[static_cast<size_t>(m.picture)].has_alpha);
   }
   if (blended)
     out.notes.push_back(fmt::format(
@@ -213,30 +213,30 @@ Result<std::unique_ptr<SurfaceSource>> make_surface(Mesh mesh, const VoxeliseOpt
   scene.corners.reserve(parts);
   for (const MeshTriangle& triangle : mesh.triangles) scene.corners.push_back(snap(mesh, triangle, grid));
 
-  // One set of levels for a texture that is opaque and one where it is not.
-  std::vector<std::array<int32_t, 2>> known(mesh.textures.size(), {-1, -1});
+  // One set of levels for a picture that is opaque and one where it is not.
+  std::vector<std::array<int32_t, 2>> known(mesh.pictures.size(), {-1, -1});
   const auto levels_of = [&](int32_t number, bool opaque) -> Result<int32_t> {
     if (number < 0) return -1;
-    const Texture& texture = mesh.textures[static_cast<size_t>(number)];
-    opaque |= !texture.has_alpha;
+    const Picture& picture = mesh.pictures[static_cast<size_t>(number)];
+    opaque |= !picture.has_alpha;
     int32_t& index = known[static_cast<size_t>(number)][opaque];
     if (index < 0) {
-      VOX_TRY(TextureLevels levels, TextureLevels::make(texture, opaque, ctx));
-      index = static_cast<int32_t>(scene.textures.size());
-      scene.textures.push_back(std::move(levels));
+      VOX_TRY(PictureLevels levels, PictureLevels::make(picture, opaque, ctx));
+      index = static_cast<int32_t>(scene.pictures.size());
+      scene.pictures.push_back(std::move(levels));
     }
     return index;
   };
   for (MeshMaterial& material : mesh.materials) {
     if (material.alpha_mode == AlphaMode::mask && !(material.alpha_cutoff > 0))
       material.alpha_mode = AlphaMode::opaque;
-    if (!options.emission) material.emission = glm::vec3(0), material.emission_texture = -1;
-    VOX_TRY(const int32_t color, levels_of(material.texture, material.alpha_mode == AlphaMode::opaque));
-    VOX_TRY(const int32_t emission, levels_of(material.emission_texture, true));
-    scene.texture_of.push_back(color);
-    scene.emission_texture_of.push_back(emission);
+    if (!options.emission) material.emission = glm::vec3(0), material.emission_picture = -1;
+    VOX_TRY(const int32_t color, levels_of(material.picture, material.alpha_mode == AlphaMode::opaque));
+    VOX_TRY(const int32_t emission, levels_of(material.emission_picture, true));
+    scene.picture_of.push_back(color);
+    scene.emission_picture_of.push_back(emission);
   }
-  mesh.textures.clear();
+  mesh.pictures.clear();
   mesh.positions = {};
   scene.mesh = std::move(mesh);
   return std::make_unique<MeshSurface>(std::move(scene), grid.info, options.tile_bits, std::move(memory),

@@ -27,7 +27,7 @@ struct VoxeliseOptions {
 /// A point is in the voxel that it lies in.
 ///
 /// The colour of a voxel is the mean, in linear light, over the triangles in it, each with the area that it
-/// has there (and times its alpha, where that is blended): of the texture around the point of the triangle
+/// has there (and times its alpha, where that is blended): of the picture around the point of the triangle
 /// that is nearest to the voxel's centre, at the size at which a voxel's edge is a texel, times the
 /// material's and the corners' colours, and its emission added, up to white. A triangle whose alpha there is
 /// below its material's cut-off is not in the voxel. Where all that is in it is blended and less than half

@@ -83,31 +83,31 @@ TriangleShade::TriangleShade(const VoxelScene& scene, uint32_t index, const std:
       tinted_ |= color != glm::vec4(1);
     }
   const Mesh& mesh = scene.mesh;
-  if (const int32_t texture = scene.texture_of[triangle.material]; texture >= 0 && !mesh.uvs.empty())
-    lay(color_, scene.textures[static_cast<size_t>(texture)], mesh.uvs, triangle);
-  if (const int32_t texture = scene.emission_texture_of[triangle.material]; texture >= 0 && !mesh.uvs.empty())
-    lay(emission_, scene.textures[static_cast<size_t>(texture)],
+  if (const int32_t picture = scene.picture_of[triangle.material]; picture >= 0 && !mesh.uvs.empty())
+    lay(color_, scene.pictures[static_cast<size_t>(picture)], mesh.uvs, triangle);
+  if (const int32_t picture = scene.emission_picture_of[triangle.material]; picture >= 0 && !mesh.uvs.empty())
+    lay(emission_, scene.pictures[static_cast<size_t>(picture)],
         mesh.emission_uvs.empty() ? mesh.uvs : mesh.emission_uvs, triangle);
-  if (!color_.texture && !emission_.texture && !tinted_)
+  if (!color_.picture && !emission_.picture && !tinted_)
     plain_ = shade(all_light, Float4{1, 1, 1, 1}, all_light);
 }
 
-void TriangleShade::lay(Map& map, const TextureLevels& texture, const std::vector<glm::vec2>& uvs,
+void TriangleShade::lay(Map& map, const PictureLevels& picture, const std::vector<glm::vec2>& uvs,
                         const MeshTriangle& triangle) const {
-  map.texture = &texture;
+  map.picture = &picture;
   for (size_t i = 0; i < 3; ++i) {
     const glm::vec2& uv = uvs[triangle.vertices[i]];
     map.u[i] = uv.x - (i ? map.u[0] : 0);
     map.v[i] = uv.y - (i ? map.v[0] : 0);
   }
-  // The longest side of what a voxel's edge covers in the texture: the larger singular value of the map.
+  // The longest side of what a voxel's edge covers in the picture: the larger singular value of the map.
   Place s, t;
   for (size_t c = 0; c < 3; ++c) {
-    s[c] = static_cast<double>(texture.width()) * (map.u[1] * gradient_[0][c] + map.u[2] * gradient_[1][c]);
-    t[c] = static_cast<double>(texture.height()) * (map.v[1] * gradient_[0][c] + map.v[2] * gradient_[1][c]);
+    s[c] = static_cast<double>(picture.width()) * (map.u[1] * gradient_[0][c] + map.u[2] * gradient_[1][c]);
+    t[c] = static_cast<double>(picture.height()) * (map.v[1] * gradient_[0][c] + map.v[2] * gradient_[1][c]);
   }
   const double ss = dot(s, s), tt = dot(t, t), st = dot(s, t), half = (ss - tt) / 2;
-  map.detail = texture.detail((ss + tt) / 2 + std::sqrt(half * half + st * st));
+  map.detail = picture.detail((ss + tt) / 2 + std::sqrt(half * half + st * st));
 }
 
 /// `glow`: what multiplies the emission.
@@ -121,7 +121,7 @@ Shade TriangleShade::shade(Float4 texel, Float4 tint, Float4 glow) const {
     cover = static_cast<uint8_t>(std::min(alpha, 1.0f) * 255 + 0.5f);
     if (cover == 0) return {};
   }
-  // Colours come multiplied by the texture's alpha.
+  // Colours come multiplied by the picture's alpha.
   if (texel[3] > 0 && texel[3] < static_cast<float>(full_light))
     texel *= static_cast<float>(full_light) / texel[3];
   texel *= tint;
@@ -137,7 +137,7 @@ Shade TriangleShade::shade(Float4 texel, Float4 tint, Float4 glow) const {
 }
 
 Shade TriangleShade::at(int x, int y, int z) const {
-  if (!color_.texture && !emission_.texture && !tinted_) return plain_;
+  if (!color_.picture && !emission_.picture && !tinted_) return plain_;
   const Place from{x + 0.5 - corners_[0][0], y + 0.5 - corners_[0][1], z + 0.5 - corners_[0][2]};
   double b = weight_[0] + dot(gradient_[0], from), c = weight_[1] + dot(gradient_[1], from);
   if (double a = 1 - b - c; a < 0 || b < 0 || c < 0) {
@@ -145,13 +145,13 @@ Shade TriangleShade::at(int x, int y, int z) const {
     const double sum = a + b + c;
     b /= sum, c /= sum;
   }
-  const auto sample = [&](const Map& map, TextureWrap wrap_u, TextureWrap wrap_v, TextureFilter filter) {
-    return map.texture->sample(map.u[0] + b * map.u[1] + c * map.u[2], map.v[0] + b * map.v[1] + c * map.v[2],
+  const auto sample = [&](const Map& map, PictureWrap wrap_u, PictureWrap wrap_v, PictureFilter filter) {
+    return map.picture->sample(map.u[0] + b * map.u[1] + c * map.u[2], map.v[0] + b * map.v[1] + c * map.v[2],
                                wrap_u, wrap_v, filter, map.detail);
   };
   Float4 texel = all_light, tint{1, 1, 1, 1}, glow = all_light;
-  if (color_.texture) texel = sample(color_, material_->wrap_u, material_->wrap_v, material_->filter);
-  if (emission_.texture)
+  if (color_.picture) texel = sample(color_, material_->wrap_u, material_->wrap_v, material_->filter);
+  if (emission_.picture)
     glow =
         sample(emission_, material_->emission_wrap_u, material_->emission_wrap_v, material_->emission_filter);
   if (tinted_)

@@ -7,8 +7,8 @@
 #include <vector>
 
 #include "formats/mesh/mesh.h"
+#include "libcolor/surface/picture_levels.h"
 #include "libcolor/surface/surface.h"
-#include "libcolor/surface/texture_levels.h"
 #include "libcolor/surface/triangle_cells.h"
 
 namespace voxkit::color {
@@ -17,11 +17,11 @@ namespace voxkit::color {
 struct VoxelScene {
   SurfaceKind kind = SurfaceKind::thin;
   std::vector<SnappedTriangle> corners;  ///< of mesh.triangles
-  Mesh mesh;                             ///< without its textures and positions
+  Mesh mesh;                             ///< without its pictures and positions
   size_t first_point = SIZE_MAX;
-  std::vector<TextureLevels> textures;
-  /// Of a material: indices into textures, or -1.
-  std::vector<int32_t> texture_of, emission_texture_of;
+  std::vector<PictureLevels> pictures;
+  /// Of a material: indices into pictures, or -1.
+  std::vector<int32_t> picture_of, emission_picture_of;
 
   /// Which voxels a triangle is in.
   TriangleCells cells(uint32_t triangle) const {
@@ -60,13 +60,13 @@ class TriangleShade {
 
  private:
   using Place = std::array<double, 3>;
-  /// A texture on the triangle.
+  /// A picture on the triangle.
   struct Map {
-    const TextureLevels* texture = nullptr;
+    const PictureLevels* picture = nullptr;
     double u[3] = {0, 0, 0}, v[3] = {0, 0, 0};  ///< at the first corner, and from there to the others
-    TextureLevels::Detail detail;
+    PictureLevels::Detail detail;
   };
-  void lay(Map& map, const TextureLevels& texture, const std::vector<glm::vec2>& uvs,
+  void lay(Map& map, const PictureLevels& picture, const std::vector<glm::vec2>& uvs,
            const MeshTriangle& triangle) const;
   Shade shade(Float4 texel, Float4 tint, Float4 glow) const;
   std::array<Place, 3> corners_{};

@@ -24,7 +24,7 @@ struct CastParams {
   double edge;                           ///< smallest edge of a voxel, world units
   double cone;                           ///< width of a pixel at distance 1 in voxels; 0: all detail
   bool skip;                             ///< step over cells, not voxels
-  ColourOf colour_of;
+  ColorOf color_of;
 };
 constexpr float opaque = 0.995f;
 
@@ -47,12 +47,12 @@ VOX_HD_HOT double world_length(const CastParams& params, int x, int y) {
 }
 
 /// Front-to-back blending of `length` base voxels of one colour; true when the ray has become opaque.
-VOX_HD_HOT bool blend(const Colour& colour, double length, Pixel& pixel) {
-  const float alpha = static_cast<float>(coverage(static_cast<double>(colour.alpha), length));
-  const float weight = alpha * (1 - pixel.colour[3]);
-  for (int k = 0; k < 3; ++k) pixel.colour[k] += weight * colour.rgb[k];
-  pixel.colour[3] += weight;
-  return pixel.colour[3] >= opaque;
+VOX_HD_HOT bool blend(const Color& color, double length, Pixel& pixel) {
+  const float alpha = static_cast<float>(coverage(static_cast<double>(color.alpha), length));
+  const float weight = alpha * (1 - pixel.color[3]);
+  for (int k = 0; k < 3; ++k) pixel.color[k] += weight * color.rgb[k];
+  pixel.color[3] += weight;
+  return pixel.color[3] >= opaque;
 }
 
 /// Keeps where the first voxel that is not void was entered.
@@ -74,15 +74,15 @@ VOX_HD_HOT void follow(const CastParams& params, GridRay& ray, Cursor& cursor, i
     const uint32_t voxel[3] = {ray.voxel(0), ray.voxel(1), ray.voxel(2)};
     const auto cell = cursor.locate(voxel[0], voxel[1], voxel[2], finest);
     ++detail.cells;
-    if (params.colour_of.is_void(cell.value)) {
+    if (params.color_of.is_void(cell.value)) {
       inside = params.skip ? cell.leave(ray) : ray.leave(0);
       continue;
     }
     const double entered = ray.t();
     if (detail.voxel[0] < 0) found(voxel, entered * length, pixel, detail);
-    const Colour colour = params.colour_of(cell.value);
-    if (colour.alpha < 1) inside = params.skip ? cell.leave(ray) : ray.leave(0);  // opaque: not left
-    if (blend(colour, (ray.t() - entered) * length / params.edge, pixel)) break;
+    const Color color = params.color_of(cell.value);
+    if (color.alpha < 1) inside = params.skip ? cell.leave(ray) : ray.leave(0);  // opaque: not left
+    if (blend(color, (ray.t() - entered) * length / params.edge, pixel)) break;
   }
 }
 
@@ -121,13 +121,13 @@ VOX_HD_HOT void follow_baseline(const CastParams& params, DenseView::Cursor& cur
     const int axis = t_max[0] <= t_max[1] ? (t_max[0] <= t_max[2] ? 0 : 2) : (t_max[1] <= t_max[2] ? 1 : 2);
     const float entered = t;
     t = t_max[axis];
-    if (!params.colour_of.is_void(cell.value)) {
+    if (!params.color_of.is_void(cell.value)) {
       if (detail.voxel[0] < 0) {
         pixel.distance = static_cast<float>(static_cast<double>(entered) * length);
         for (int a = 0; a < 3; ++a) detail.voxel[a] = static_cast<int32_t>(voxel[a]);
       }
       const double crossed = static_cast<double>(t - entered) * length / params.edge;
-      if (blend(params.colour_of(cell.value), crossed, pixel)) break;
+      if (blend(params.color_of(cell.value), crossed, pixel)) break;
     }
     t_max[axis] += delta[axis];
     voxel[axis] += step[axis];

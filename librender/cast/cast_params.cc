@@ -7,13 +7,12 @@
 namespace voxkit::render {
 namespace {
 
-/// The pixels that may see the volume's box: those around its corners; all of them where a corner is not in
+/// The pixels that may see the volume: those around its corners; all of them where a corner is not in
 /// front of the eye.
-void bound_pixels(const RayGenerator& rays, const glm::dvec3& half, CastParams& params) {
+void bound_pixels(const RayGenerator& rays, const GridTransform& transform, CastParams& params) {
   double left = params.width, right = 0, top = params.height, bottom = 0;
   for (int i = 0; i < 8; ++i) {
-    const glm::dvec3 corner((i & 1 ? 1 : -1) * half.x, (i & 2 ? 1 : -1) * half.y, (i & 4 ? 1 : -1) * half.z);
-    const glm::dvec3 to = corner - rays.eye();
+    const glm::dvec3 to = transform.corner(i) - rays.eye();
     const double depth = glm::dot(to, rays.forward()) * rays.pixel_width();
     if (!(depth > 1e-9 * rays.pixel_width())) return;
     const double x = params.width * 0.5 + glm::dot(to, rays.right()) / depth,
@@ -63,13 +62,13 @@ Result<CastParams> cast_params(const VolumeInfo& info, const Camera& camera, con
       .edge = transform.smallest_edge(),
       .cone = 0,
       .skip = options.skip,
-      .colour_of = ColourOf(info.format, options.range),
+      .color_of = ColorOf(info.format, options.range),
   };
   // Where not even the farthest corner is two voxels to a pixel, every ray sees all detail.
-  const double farthest = glm::length(rays.eye()) + glm::length(transform.half);
+  const double farthest = glm::length(rays.eye()) + transform.radius();
   const double cone = params.pixel / params.edge;
   if (options.level_of_detail && cone * farthest >= 2) params.cone = cone;
-  bound_pixels(rays, transform.half, params);
+  bound_pixels(rays, transform, params);
   return params;
 }
 

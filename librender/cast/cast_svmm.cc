@@ -23,7 +23,7 @@ Status cast(const SvmmGrid& grid, const Camera& camera, const CastOptions& optio
   } else {
     VOX_TRY(const std::shared_ptr<VoidMemo> memo, grid.learned().memo(options.range, ctx));
     const BoxedView<SvmmSpace> boxed{
-        {view, &pools, {&params.colour_of}}, &params, memo.get(), least_log2(info, camera, options)};
+        {view, &pools, {&params.color_of}}, &params, memo.get(), least_log2(info, camera, options)};
     VOX_CHECK(cast_with(boxed, params, options, frame, ctx));
   }
   return grid.volume().store().status();

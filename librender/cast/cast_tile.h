@@ -51,10 +51,10 @@ template <int width, int height, class Cursor, class Keep>
     }
     detail.cells = rays.passed(i);
     if (!rays.gone(i)) {
-      if (rays.moving(i) && cell->colour.alpha >= 1) {
+      if (rays.moving(i) && cell->color.alpha >= 1) {
         ++detail.cells;
         found(voxel, rays.t(i) * world_length(params, pixel_x, pixel_y), pixel, detail);
-        blend(cell->colour, 0, pixel);
+        blend(cell->color, 0, pixel);
       } else {  // through what is translucent, or where doubles do not suffice
         for (int a = 0; a < 3; ++a) voxel[a] = mirror.voxel(a, rays.voxel(i, a));
         GridRay ray(params.start, ray_through(params, pixel_x, pixel_y).direction);

@@ -23,10 +23,10 @@ Status look_up_colors(const color::Volume& volume, Frame& frame, Context& ctx) {
       if (voxel[0] < 0) continue;
       const uint64_t place = color::morton_code(
           static_cast<uint32_t>(voxel[0]), static_cast<uint32_t>(voxel[1]), static_cast<uint32_t>(voxel[2]));
-      float(&pixel)[4] = frame.pixels[static_cast<size_t>(i)].colour;
+      float(&pixel)[4] = frame.pixels[static_cast<size_t>(i)].color;
       const auto height = static_cast<int>(pixel[0] * 255 + 0.5f);  // of the cell, see DagCastView
       const color::Rgb c = reader.color(finder.find(place, height).color);
-      const Colour seen = ColourOf(VoxelFormat::rgba32, {})(
+      const Color seen = ColorOf(VoxelFormat::rgba32, {})(
           Voxel::of(static_cast<uint32_t>(c.r | c.g << 8 | c.b << 16) | 0xff000000u));
       for (int k = 0; k < 3; ++k) pixel[k] = seen.rgb[k];
     }

@@ -53,7 +53,7 @@ struct BoxedCell {
   Voxel value;
   VoidBox box;
   bool is_void;
-  Colour colour;  ///< unless it is void
+  Color color;  ///< unless it is void
   [[gnu::always_inline]] bool leave(GridRay& ray) const { return ray.leave(box.lo, box.hi); }
   [[gnu::always_inline]] bool holds(const uint32_t (&v)[3]) const {
     return ((v[0] - box.lo[0] < box.hi[0] - box.lo[0]) & (v[1] - box.lo[1] < box.hi[1] - box.lo[1]) &
@@ -64,8 +64,8 @@ struct BoxedCell {
 /// SVMM files as what boxes are grown in.
 struct SvmmSpace {
   struct IsVoid {
-    const ColourOf* colour_of;
-    bool operator()(const Voxel& value) const { return colour_of->is_void(value); }
+    const ColorOf* color_of;
+    bool operator()(const Voxel& value) const { return color_of->is_void(value); }
   };
   const svmm::View* view;
   const svmm::MappedPools* pools;
@@ -107,10 +107,10 @@ struct BoxedView {
         known.box.hi[a] = static_cast<uint32_t>(
             std::min(int64_t{known.box.lo[a]} + (int64_t{1} << cell.log2_edge), volume_.params->dims[a]));
       }
-      const ColourOf& colour_of = volume_.params->colour_of;
-      known.is_void = colour_of.is_void(cell.value);
+      const ColorOf& color_of = volume_.params->color_of;
+      known.is_void = color_of.is_void(cell.value);
       if (!known.is_void)
-        known.colour = colour_of(cell.value);
+        known.color = color_of(cell.value);
       else if (cell.log2_edge >= volume_.least_log2)
         grow_cell(cell.log2_edge, known);
       return known;

@@ -17,7 +17,7 @@ namespace {
 constexpr int64_t most_dense_voxels = int64_t{1} << 31;
 
 Status check_scalar(const VolumeInfo& info) {
-  if (!is_colour(info.format)) return {};
+  if (!is_color(info.format)) return {};
   return bad_input({}, "voxels are " + std::string(name(info.format)) +
                            ": expected a scalar volume for direct volume rendering");
 }
@@ -32,7 +32,7 @@ Result<DvrParams> dvr_params(const VolumeInfo& info, const Camera& camera, const
   const RayGenerator rays(camera, options.width, options.height);
   const double edge = transform.smallest_edge(), step = options.step * edge;
   // Numbers of samples are exact as floats.
-  if (2 * glm::length(transform.half) / step > 0x1p23)
+  if (2 * transform.radius() / step > 0x1p23)
     return bad_usage("a ray would take more than 2^23 samples: expected larger steps");
   const glm::dvec3 light = light_of(rays);
   // Gradients in a unit near the width of the transfer function, a power of two, which rounds nothing: so
@@ -48,9 +48,9 @@ Result<DvrParams> dvr_params(const VolumeInfo& info, const Camera& camera, const
       .length = static_cast<float>(options.step),
       .margin = static_cast<float>(longest) * 0x1p-19f,
       .shortest = static_cast<float>(longest) * 0x1p-16f,
-      .edge = {},
+      .slope = {},
       .unit = static_cast<float>(unit),
-      .voxel = {},
+      .reach = {},
       .light = {},
       .flat = static_cast<float>(span) * 1e-5f,
       .lit = options.lit,
@@ -63,8 +63,11 @@ Result<DvrParams> dvr_params(const VolumeInfo& info, const Camera& camera, const
       .slice = static_cast<int32_t>(skips.slice()),
   };
   for (int a = 0; a < 3; ++a) {
-    params.edge[a] = static_cast<float>(edge / transform.voxel[a] * (from_neighbours ? 1 : unit));
-    params.voxel[a] = transform.voxel[a];
+    const double per_edge = edge / transform.voxel[a] * (from_neighbours ? 1 : unit);
+    for (int world = 0; world < 3; ++world) {
+      params.slope[world][a] = static_cast<float>(transform.along[world][a] * per_edge);
+      params.reach[world][a] = transform.axes[a][world] * transform.voxel[a];
+    }
     params.light[a] = static_cast<float>(light[a]);
   }
   return params;

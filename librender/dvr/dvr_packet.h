@@ -18,14 +18,15 @@ struct DvrParams {
   float length;    ///< the same step in smallest voxel edges, along the camera's axis
   float margin;    ///< more than a sample's place is off by rounding, in voxels
   float shortest;  ///< way to a sample beside from which a gradient can be had in spite of that
-  float edge[3];  ///< smallest edge of a voxel by its edge along each axis, times the unit of gradients where
-                  ///< these do not
-  float unit;     ///< of gradients, where these come from neighbours
-  double voxel[3];  ///< edges of a voxel in the world
-  float light[3];   ///< unit vector towards the light, world
-  float flat;       ///< gradients of less than this are none, units an edge
-  bool lit;         ///< not with DvrGradient::none
-  float modulate;   ///< opacity is multiplied by this times the gradient's length, up to 1; 0: it is not
+  float slope[3]
+             [3];  ///< from gradients in the grid to those in the world, a smallest edge of a voxel being 1
+                   ///< there, times the unit of gradients where these are not from neighbours; rows: world
+  float unit;      ///< of gradients, where these come from neighbours
+  double reach[3][3];  ///< from directions in the grid to those in the world; rows: world
+  float light[3];      ///< unit vector towards the light, world
+  float flat;          ///< gradients of less than this are none, units an edge
+  bool lit;            ///< not with DvrGradient::none
+  float modulate;      ///< opacity is multiplied by this times the gradient's length, up to 1; 0: it is not
   const TransferFunction::Entry* table;
   float first, scale;
   const uint8_t* distances;  ///< of bricks to those that can be seen; null: all are looked at
@@ -39,7 +40,7 @@ enum class DvrGradient { none, analytic, neighbour };
 template <class Lanes>
 struct DvrPixels {
   using Real = typename Lanes::Real;
-  Real colour[3] = {};               ///< light gathered
+  Real color[3] = {};                ///< light gathered
   Real through = Lanes::all(1.0f);   ///< what is still let through
   typename Lanes::Mask hit = {};     ///< whether something was seen
   typename Lanes::Int first = {};    ///< the first sample that was
@@ -57,13 +58,20 @@ struct DvrRays {
   Vec<Real> ahead, half;            ///< for light_sample
 };
 
+/// A gradient of the grid in the world, see DvrParams::slope.
+template <class Real>
+VOX_HD_HOT Vec<Real> to_world(const DvrParams& params, const Vec<Real>& g) {
+  const auto component = [&](const float(&row)[3]) { return g.x * row[0] + g.y * row[1] + g.z * row[2]; };
+  return {component(params.slope[0]), component(params.slope[1]), component(params.slope[2])};
+}
+
 /// Sets up the rays of the packet whose upper left pixel is (x, y). Loops over lanes are such that compilers
 /// make vectors of them.
 template <class Lanes>
 VOX_HD_HOT void begin_rays(const DvrParams& params, int x, int y, DvrRays<Lanes>& rays) {
   constexpr int n = Lanes::held;
   const CastParams& cast = params.cast;
-  double u[n], v[n], length[n], ahead[3][n], half[3][n], square[n], near[n], far[n];
+  double u[n], v[n], length[n], way[3][n], ahead[3][n], half[3][n], square[n], near[n], far[n];
   double missed[n];  // 1: the ray misses the volume
   for (int i = 0; i < n; ++i) {
     const int lane = Lanes::first() + i, px = x + lane % Lanes::width, py = y + lane / Lanes::width;
@@ -86,12 +94,19 @@ VOX_HD_HOT void begin_rays(const DvrParams& params, int x, int y, DvrRays<Lanes>
       far[i] = to < far[i] ? to : far[i];
       at[a][i] = static_cast<float>(o + d * (params.middle * params.step) - 0.5);
       step[a][i] = static_cast<float>(d * params.step);
-      ahead[a][i] = d * params.voxel[a] / length[i];
-      half[a][i] = static_cast<double>(params.light[a]) - ahead[a][i];
-      square[i] += half[a][i] * half[a][i];
+      way[a][i] = d;
     }
     rays.at[a] = Lanes::load(at[a]);
     rays.step[a] = Lanes::load(step[a]);
+  }
+  for (int a = 0; a < 3; ++a) {
+    const double(&reach)[3] = params.reach[a];
+    for (int i = 0; i < n; ++i) {
+      const double d = reach[0] * way[0][i] + reach[1] * way[1][i] + reach[2] * way[2][i];
+      ahead[a][i] = d / length[i];
+      half[a][i] = static_cast<double>(params.light[a]) - ahead[a][i];
+      square[i] += half[a][i] * half[a][i];
+    }
   }
   int32_t first[n], last[n];
   float lengths[n], unit[3][n], between[3][n];
@@ -214,12 +229,10 @@ VOX_HD_HOT void blend_samples(const DvrParams& params, const DvrRays<Lanes>& ray
   Real density = Lanes::gather(table + 3, at, wanted);
   const Mask seen = density > 0.0f;
   if (Lanes::bits(seen) == 0) return;
-  Real colour[3];
-  for (int i = 0; i < 3; ++i) colour[i] = Lanes::gather(table + i, at, seen);
+  Real color[3];
+  for (int i = 0; i < 3; ++i) color[i] = Lanes::gather(table + i, at, seen);
   Vec<Real> gradient;
-  if constexpr (kind != DvrGradient::none)
-    gradient = {sample.here.gradient.x * params.edge[0], sample.here.gradient.y * params.edge[1],
-                sample.here.gradient.z * params.edge[2]};
+  if constexpr (kind != DvrGradient::none) gradient = to_world(params, sample.here.gradient);
   if (kind != DvrGradient::none && params.modulate > 0) {
     const Real share = Lanes::least(Lanes::root(dot(gradient, gradient)) * params.modulate, Lanes::all(1.0f));
     const Real opacity = (1.0f - exp2_of_density<Lanes>(-density)) * share;
@@ -229,13 +242,13 @@ VOX_HD_HOT void blend_samples(const DvrParams& params, const DvrRays<Lanes>& ray
   if (kind != DvrGradient::none && params.lit) {
     const Vec<float> light{params.light[0], params.light[1], params.light[2]};
     const Lit<Real> lit = light_sample<Lanes>(gradient, light, rays.half, rays.ahead, params.flat);
-    for (Real& c : colour) c = c * lit.diffuse + lit.specular;
+    for (Real& c : color) c = c * lit.diffuse + lit.specular;
   }
   const Real through = pixels.through * exp2_of_density<Lanes>(-density * rays.length);
   const Real weight = pixels.through - through;
   for (int i = 0; i < 3; ++i) {
-    const Real more = pixels.colour[i] + weight * colour[i];
-    pixels.colour[i] = seen ? more : pixels.colour[i];
+    const Real more = pixels.color[i] + weight * color[i];
+    pixels.color[i] = seen ? more : pixels.color[i];
   }
   pixels.through = seen ? through : pixels.through;
   const Mask shown = density > 0.0f;
@@ -331,8 +344,8 @@ VOX_HD_HOT void march(const DvrParams& params, Sampler& sampler, int x, int y, D
 template <class Lanes>
 VOX_HD_HOT void finish_pixel(const DvrParams& params, const DvrPixels<Lanes>& found, int i, int x, int y,
                              bool where, Pixel& pixel, PixelDetail& detail) {
-  for (int c = 0; c < 3; ++c) pixel.colour[c] = Lanes::get(found.colour[c], i);
-  pixel.colour[3] = 1 - Lanes::get(found.through, i);
+  for (int c = 0; c < 3; ++c) pixel.color[c] = Lanes::get(found.color[c], i);
+  pixel.color[3] = 1 - Lanes::get(found.through, i);
   pixel.distance = __builtin_inff();
   detail = {};
   detail.cells = static_cast<uint32_t>(Lanes::get(found.samples, i));

@@ -94,7 +94,7 @@ Result<double> cast_with(const NanovdbGrid& volume, const Cast& cast, std::vecto
         if (cast.march == March::first_active ? nanovdb::firstActive(ray, accessor, ijk, t)
                                               : first_hit(ray, accessor, ijk, t)) {
           const nanovdb::Rgba8 value = accessor.getValue(ijk);
-          for (int k = 0; k < 4; ++k) hit.colour[k] = static_cast<float>(value[k]) / 255;
+          for (int k = 0; k < 4; ++k) hit.color[k] = static_cast<float>(value[k]) / 255;
           hit.distance = t * static_cast<float>(scale);
           for (int a = 0; a < 3; ++a) hit.voxel[a] = ijk[a];
         }

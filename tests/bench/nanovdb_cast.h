@@ -27,7 +27,7 @@ class NanovdbGrid {
 
 /// What a ray found: as much as a Pixel of librender holds.
 struct Hit {
-  float colour[4] = {};
+  float color[4] = {};
   float distance = 0;               ///< from the eye, world units
   int32_t voxel[3] = {-1, -1, -1};  ///< -1: nothing
 };

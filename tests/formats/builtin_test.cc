@@ -56,12 +56,12 @@ Voxel menger_voxel(int level, int64_t side, Index3 v) {
     }
     if (ones >= 2) return {};
   }
-  Voxel colour;
+  Voxel color;
   for (int axis = 0; axis < 3; ++axis) {
-    colour.bytes[static_cast<size_t>(axis)] = static_cast<std::byte>(255 * v[axis] / side);
+    color.bytes[static_cast<size_t>(axis)] = static_cast<std::byte>(255 * v[axis] / side);
   }
-  colour.bytes[3] = std::byte{255};
-  return colour;
+  color.bytes[3] = std::byte{255};
+  return color;
 }
 
 int64_t power(int64_t base, int exponent) {

@@ -13,7 +13,7 @@
 namespace voxkit {
 namespace {
 
-using test::colour_info;
+using test::color_info;
 using test::FlatSource;
 using test::ForwardSource;
 using test::read_all;
@@ -133,18 +133,18 @@ TEST_F(ConvertTest, FloatsStretchAndNanGoesLow) {
     EXPECT_TRUE((converted<uint8_t>(info, Floats(6), "u8", range)).empty());
 }
 
-TEST_F(ConvertTest, Colours) {
+TEST_F(ConvertTest, Colors) {
   const VolumeInfo scalar = scalar_info({2, 1, 1}, SampleType::u8);
   EXPECT_EQ((converted<uint8_t>(scalar, Bytes{0, 200}, "rgba8")), (Bytes{0, 0, 0, 0, 200, 200, 200, 200}));
   EXPECT_EQ((converted<uint8_t>(scalar_info({2, 1, 1}, SampleType::bit), Bytes{0, 1}, "rgba8")),
             (Bytes{0, 0, 0, 0, 255, 255, 255, 255}));
-  EXPECT_EQ((converted<uint8_t>(colour_info({1, 1, 1}, VoxelFormat::rgb24), Bytes{1, 2, 3}, "rgba8")),
+  EXPECT_EQ((converted<uint8_t>(color_info({1, 1, 1}, VoxelFormat::rgb24), Bytes{1, 2, 3}, "rgba8")),
             (Bytes{1, 2, 3, 255}));
   std::mt19937 random(9);
   Bytes rgba(4000);
   for (uint8_t& v : rgba) v = static_cast<uint8_t>(random());
-  const Bytes gray = converted<uint8_t>(colour_info({1000, 1, 1}, VoxelFormat::rgba32), rgba, "u8");
-  const Bytes gray_rgb = converted<uint8_t>(colour_info({1333, 1, 1}, VoxelFormat::rgb24), rgba, "u8");
+  const Bytes gray = converted<uint8_t>(color_info({1000, 1, 1}, VoxelFormat::rgba32), rgba, "u8");
+  const Bytes gray_rgb = converted<uint8_t>(color_info({1333, 1, 1}, VoxelFormat::rgb24), rgba, "u8");
   ASSERT_EQ(gray.size(), 1000u);
   for (size_t i = 0; i < 1000; ++i) {
     const auto luma = [&](size_t at) {
@@ -154,7 +154,7 @@ TEST_F(ConvertTest, Colours) {
     ASSERT_EQ(gray_rgb[i], std::floor(luma(3 * i) + 0.5 + 1e-9));
   }
   EXPECT_EQ(
-      (converted<uint16_t>(colour_info({1, 1, 1}, VoxelFormat::rgba32), Bytes{255, 255, 255, 255}, "u16")),
+      (converted<uint16_t>(color_info({1, 1, 1}, VoxelFormat::rgba32), Bytes{255, 255, 255, 255}, "u16")),
       Shorts{255});
 }
 
@@ -165,9 +165,9 @@ TEST_F(ConvertTest, Bits) {
                                 Floats{0, -0.f, 1e-30f, std::nanf("")}, "bit")),
             (Bytes{0, 0, 1, 0}));
   EXPECT_EQ(
-      (converted<uint8_t>(colour_info({2, 1, 1}, VoxelFormat::rgba32), Bytes{9, 9, 9, 0, 0, 0, 0, 1}, "bit")),
+      (converted<uint8_t>(color_info({2, 1, 1}, VoxelFormat::rgba32), Bytes{9, 9, 9, 0, 0, 0, 0, 1}, "bit")),
       (Bytes{0, 1}));
-  EXPECT_EQ((converted<uint8_t>(colour_info({2, 1, 1}, VoxelFormat::rgb24), Bytes{0, 0, 0, 0, 0, 1}, "bit")),
+  EXPECT_EQ((converted<uint8_t>(color_info({2, 1, 1}, VoxelFormat::rgb24), Bytes{0, 0, 0, 0, 0, 1}, "bit")),
             (Bytes{0, 1}));
   EXPECT_EQ((converted<uint8_t>(scalar_info({2, 1, 1}, SampleType::bit), Bytes{0, 1}, "u8")), (Bytes{0, 1}));
 }
@@ -203,7 +203,7 @@ TEST_F(ConvertTest, ApplyScale) {
   ASSERT_TRUE(scaled);
   EXPECT_EQ(read_all<float>(**scaled), (Floats{-1, 1, -65537}));
   EXPECT_EQ((*scaled)->info().slope, 1);
-  EXPECT_FALSE(apply_scale(volume(colour_info({1, 1, 1}, VoxelFormat::rgb24), Bytes(3)), ctx_));
+  EXPECT_FALSE(apply_scale(volume(color_info({1, 1, 1}, VoxelFormat::rgb24), Bytes(3)), ctx_));
 }
 
 /// Weight of source voxel v in voxel i along an axis from n to m voxels: the plain definition, as a fraction.
@@ -226,12 +226,12 @@ TEST_F(ConvertTest, ResampleMatchesThePlainDefinition) {
   floats.resize(7 * 6 * 5);
   for (const Index3 to : {Index3(7, 6, 1), Index3(1, 1, 1), Index3(14, 12, 10), Index3(3, 9, 5),
                           Index3(4, 4, 4), Index3(20, 2, 3)}) {
-    VolumeInfo info = colour_info(from, VoxelFormat::rgba32);
+    VolumeInfo info = color_info(from, VoxelFormat::rgba32);
     info.affine.origin = {1, 2, 3};
-    auto colours = resample(volume(info, values), to);
-    ASSERT_TRUE(colours);
-    const Bytes got = read_all<uint8_t>(**colours);
-    EXPECT_EQ(got, read_all<uint8_t>(**colours, {3, 2, 2}));
+    auto colors = resample(volume(info, values), to);
+    ASSERT_TRUE(colors);
+    const Bytes got = read_all<uint8_t>(**colors);
+    EXPECT_EQ(got, read_all<uint8_t>(**colors, {3, 2, 2}));
     auto real = resample(volume(scalar_info(from, SampleType::f32), floats), to);
     ASSERT_TRUE(real);
     const Floats got_real = read_all<float>(**real);
@@ -255,7 +255,7 @@ TEST_F(ConvertTest, ResampleMatchesThePlainDefinition) {
           ASSERT_NEAR(got_real[at], scalar, 1e-3);
         }
     // The outer faces stay where they are.
-    const VolumeInfo& made = (*colours)->info();
+    const VolumeInfo& made = (*colors)->info();
     for (int a = 0; a < 3; ++a) {
       EXPECT_DOUBLE_EQ(made.affine.origin[a] - made.affine.spacing()[a] / 2, a + 0.5);
       EXPECT_DOUBLE_EQ(made.affine.origin[a] + made.affine.spacing()[a] * (double(to[a]) - 0.5),

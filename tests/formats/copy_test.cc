@@ -11,7 +11,7 @@
 namespace voxkit {
 namespace {
 
-using test::colour_info;
+using test::color_info;
 using test::FlatSource;
 using test::ForwardSource;
 using test::MemorySink;
@@ -78,7 +78,7 @@ TEST(CopyVolume, EveryFormatThreadsAndKind) {
     for (const VoxelFormat format : {VoxelFormat::density8, VoxelFormat::rgb24, VoxelFormat::rgba32})
       for (const int threads : {1, 3})
         for (const bool forward : {false, true}) {
-          const VolumeInfo info = colour_info(dims, format);
+          const VolumeInfo info = color_info(dims, format);
           const auto voxels = random_bytes(static_cast<size_t>(info.box().voxels() * voxel_bytes(format)), 7);
           Context ctx{.threads = threads, .memory = &memory};
           double done = 0;
@@ -122,7 +122,7 @@ TEST(CopyVolume, UniformBoxesAreNotRead) {
   MemoryBudget memory(1 << 24);
   Context ctx{.threads = 2, .memory = &memory};
   MemorySink flat_sink({100, 100, 100}, VoxelFormat::rgba32);
-  FlatSource flat(colour_info({100, 100, 100}, VoxelFormat::rgba32), Voxel::of(uint32_t{0x01020304}));
+  FlatSource flat(color_info({100, 100, 100}, VoxelFormat::rgba32), Voxel::of(uint32_t{0x01020304}));
   ASSERT_TRUE(copy_volume(flat, flat.info().box(), flat_sink, ctx));
   ASSERT_EQ(flat_sink.voxels.size(), 4000000u);
   EXPECT_EQ(flat_sink.voxels.back(), std::byte{1});
@@ -189,8 +189,8 @@ TEST(MeasureRange, FloatsAndFlat) {
             (ValueRange{0, 0}));
   FlatSource flat(scalar_info({1000000, 1000000, 1000}, SampleType::f32), Voxel::of(7.5f));
   EXPECT_EQ(measure_range(flat, ctx).value(), (ValueRange{7.5, 7.5}));
-  FlatSource colour(colour_info({2, 2, 2}, VoxelFormat::rgb24), Voxel{});
-  EXPECT_FALSE(measure_range(colour, ctx));
+  FlatSource color(color_info({2, 2, 2}, VoxelFormat::rgb24), Voxel{});
+  EXPECT_FALSE(measure_range(color, ctx));
 }
 
 }  // namespace

@@ -308,7 +308,7 @@ TEST_F(DicomVolume, SeriesFoldersAndTimeSteps) {
   EXPECT_EQ(firsts(*voxels), (std::vector<int>{20, 21, 22}));
 }
 
-TEST_F(DicomVolume, ColoursAndPalettes) {
+TEST_F(DicomVolume, ColorsAndPalettes) {
   File rgb;
   rgb.us(0x28, 2, 3).us(0x28, 0x100, 8).us(0x28, 0x101, 8).us(0x28, 0x102, 7).us(0x28, 0x103, 0);
   rgb.set(0x28, 4, "CS", "RGB");

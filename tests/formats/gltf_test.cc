@@ -23,7 +23,7 @@ class GltfTest : public MeshReadingTest {
   Mesh read(const GltfFile& file) { return MeshReadingTest::read("a.gltf", file.json()); }
 };
 
-TEST_F(GltfTest, TextureCoordinatesOfEachType) {
+TEST_F(GltfTest, PictureCoordinatesOfEachType) {
   if (!reads_images()) GTEST_SKIP() << "no OpenImageIO";
   picture("a.png");
   const auto check = [&](int component, const std::string& bytes, const std::string& more,
@@ -70,7 +70,7 @@ TEST_F(GltfTest, QuantisedPlaces) {
   check(5122, bytes_of<int16_t>({-300, 0, 0, 9, 300, 0, 0, 9, 300, 300, 0, 9, -300, 300, 0, 9}), "", 300);
 }
 
-TEST_F(GltfTest, ColoursOfEachType) {
+TEST_F(GltfTest, ColorsOfEachType) {
   for (const auto& [component, bytes, type, more] :
        {std::tuple(5126, bytes_of<float>({1, 0.5f, 0, 1, 1, 0.5f, 0, 1, 1, 0.5f, 0, 1, 1, 0.5f, 0, 1}),
                    "VEC4", ""),
@@ -252,25 +252,25 @@ TEST_F(GltfTest, MaterialsAndWhatTheyEmit) {
   const MeshMaterial& material = mesh.materials[0];
   EXPECT_EQ(material.color, glm::vec4(1, 0, 0, 0.5f));
   EXPECT_EQ(material.emission, glm::vec3(0, 1, 4));
-  ASSERT_EQ(material.emission_texture, 0);
-  EXPECT_EQ(material.emission_filter, TextureFilter::nearest);
-  EXPECT_EQ(material.emission_wrap_u, TextureWrap::clamp);
+  ASSERT_EQ(material.emission_picture, 0);
+  EXPECT_EQ(material.emission_filter, PictureFilter::nearest);
+  EXPECT_EQ(material.emission_wrap_u, PictureWrap::clamp);
   EXPECT_EQ(mesh.uvs[0], glm::vec2(5, 5));
 
-  // Both have textures: each goes by its own coordinates.
+  // Both have pictures: each goes by its own coordinates.
   file.materials = R"({"pbrMetallicRoughness":{"baseColorTexture":{"index":0}},"emissiveFactor":[1,1,1],)"
                    R"("emissiveTexture":{"index":0,"texCoord":1}})";
   const Mesh both = read(file);
-  EXPECT_EQ(both.textures.size(), 1u);
-  EXPECT_EQ(both.materials[0].filter, TextureFilter::nearest);
+  EXPECT_EQ(both.pictures.size(), 1u);
+  EXPECT_EQ(both.materials[0].filter, PictureFilter::nearest);
   EXPECT_EQ(both.uvs[2], glm::vec2(1, 1));
   ASSERT_EQ(both.emission_uvs.size(), 4u);
   EXPECT_EQ(both.emission_uvs[2], glm::vec2(6, 6));
 
-  // A texture without coordinates is left out, with a word.
+  // A picture without coordinates is left out, with a word.
   file.use("");
   const Mesh plain = read(file);
-  EXPECT_EQ(plain.materials[plain.triangles[0].material].texture, -1);
+  EXPECT_EQ(plain.materials[plain.triangles[0].material].picture, -1);
   EXPECT_TRUE(has_note(plain, "texture coordinates"));
 }
 
@@ -375,13 +375,13 @@ TEST_F(GltfTest, WebP) {
       R"(,"textures":[{{"extensions":{{"EXT_texture_webp":{{"source":0}}}}}}],"images":[{{"bufferView":{},"mimeType":"image/webp"}}])",
       file.view(webp));
   const Mesh mesh = read(file);
-  ASSERT_EQ(mesh.textures.size(), 1u);
+  ASSERT_EQ(mesh.pictures.size(), 1u);
   EXPECT_EQ(texel(mesh, 0, 1, 0), (std::array<int, 4>{0, 255, 0, 255}));
   EXPECT_EQ(texel(mesh, 0, 0, 1), (std::array<int, 4>{0, 0, 255, 128}));
   // As a file of its own, and of an .obj.
   put("a.webp", webp);
   put("m.mtl", "newmtl a\nmap_Kd a.webp\n");
-  EXPECT_EQ(MeshReadingTest::read("a.obj", obj_square("mtllib m.mtl\nusemtl a\n")).textures[0].width, 2);
+  EXPECT_EQ(MeshReadingTest::read("a.obj", obj_square("mtllib m.mtl\nusemtl a\n")).pictures[0].width, 2);
   // Damaged, and a KTX2 file.
   put("a.webp", webp.substr(0, 30));
   MeshReadingTest::expect_error("a.obj", obj_square("mtllib m.mtl\nusemtl a\n"), "WebP");

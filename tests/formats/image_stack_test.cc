@@ -143,7 +143,7 @@ TEST_F(ImageStack, WhatAnEndingHoldsComesBackExactly) {
       ASSERT_TRUE(back) << back.error().what;
       EXPECT_EQ(got.dims, dims);
       EXPECT_EQ(got.format, c.format);
-      if (!is_colour(c.format)) {
+      if (!is_color(c.format)) {
         EXPECT_EQ(got.sample_type, c.type);
       }
       EXPECT_EQ(*back, voxels);

@@ -53,8 +53,8 @@ class MeshReadingTest : public FileFormatTest {
     EXPECT_TRUE(written) << written.error().what;
     return get(path(name));
   }
-  static std::array<int, 4> texel(const Mesh& mesh, size_t texture, int64_t x, int64_t y) {
-    const uint8_t* p = mesh.textures[texture].data() + 4 * (y * mesh.textures[texture].width + x);
+  static std::array<int, 4> texel(const Mesh& mesh, size_t picture, int64_t x, int64_t y) {
+    const uint8_t* p = mesh.pictures[picture].data() + 4 * (y * mesh.pictures[picture].width + x);
     return {p[0], p[1], p[2], p[3]};
   }
   /// Lowest and highest corner of triangles and points.

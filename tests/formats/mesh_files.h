@@ -27,7 +27,7 @@ std::string bytes_of(const std::vector<T>& values) {
   return {reinterpret_cast<const char*>(values.data()), values.size() * sizeof(T)};
 }
 
-/// A square of two triangles from (0, 0, 0) to (1, 1, 0), with texture coordinates from the top left, as
+/// A square of two triangles from (0, 0, 0) to (1, 1, 0), with picture coordinates from the top left, as
 /// glTF.
 struct GltfSquare {
   std::vector<float> positions{0, 0, 0, 1, 0, 0, 1, 1, 0, 0, 1, 0};

@@ -65,7 +65,7 @@ TEST_F(MeshPlyTest, PolygonsAndLineEnds) {
   EXPECT_EQ(mesh.positions[2], glm::dvec3(1.5, 1, 0));
 }
 
-TEST_F(MeshPlyTest, TexturesOfMeshLab) {
+TEST_F(MeshPlyTest, PicturesOfMeshLab) {
   if (!load_module(module_folder(), {"image_stack", "reading images", ""})) GTEST_SKIP() << "no OpenImageIO";
   auto image = Image::create(2, 1, 1, SampleType::u8, ctx_);
   image->row(0)[0] = 10, image->row(0)[1] = 200;
@@ -79,8 +79,8 @@ TEST_F(MeshPlyTest, TexturesOfMeshLab) {
                                             "0 0 0 0 0\n1 0 0 1 0\n1 1 0 1 1\n0 1 0 0 1\n4 0 1 2 3\n"),
                         ctx_);
   ASSERT_TRUE(mesh) << mesh.error().what;
-  ASSERT_EQ(mesh->textures.size(), 1u);
-  EXPECT_EQ(mesh->textures[0].data()[4], 200);
+  ASSERT_EQ(mesh->pictures.size(), 1u);
+  EXPECT_EQ(mesh->pictures[0].data()[4], 200);
   EXPECT_EQ(mesh->uvs[2], glm::vec2(1, 0));  // from the top
   mesh = read_mesh(
       put("a.ply", head + "element face 2\nproperty list uchar int vertex_indices\n"
@@ -127,7 +127,7 @@ TEST_F(MeshPlyTest, Refusals) {
                "--max-memory", ErrorCode::limit);
 }
 
-TEST_F(MeshPlyTest, ColoursOfFaces) {
+TEST_F(MeshPlyTest, ColorsOfFaces) {
   const std::string vertices = "element vertex 4\nproperty float x\nproperty float y\nproperty float z\n";
   const std::string faces =
       "element face 2\nproperty list uchar int vertex_indices\nproperty uchar red\n"
@@ -171,7 +171,7 @@ TEST_F(MeshPlyTest, Strips) {
   expect_error(head + "3 0 1 -2\n", "expected one below 6");
 }
 
-TEST_F(MeshPlyTest, NamesOfColoursAndWhatIsDropped) {
+TEST_F(MeshPlyTest, NamesOfColorsAndWhatIsDropped) {
   for (const char* names : {"r g b", "red green blue", "diffuse_red diffuse_green diffuse_blue"}) {
     std::string text(names), properties;
     for (size_t at = 0; at < text.size();) {
@@ -191,7 +191,7 @@ TEST_F(MeshPlyTest, NamesOfColoursAndWhatIsDropped) {
   }
 }
 
-TEST_F(MeshPlyTest, SeveralTextures) {
+TEST_F(MeshPlyTest, SeveralPictures) {
   const std::string head =
       "ply\nformat ascii 1.0\ncomment TextureFile a.png\ncomment TextureFile b.png\nelement vertex 3\n"
       "property float x\nproperty float y\nproperty float z\nelement face 2\n"

@@ -1,4 +1,4 @@
-// Meshes and their textures as they are read.
+// Meshes and their pictures as they are read.
 #include "formats/mesh/mesh.h"
 
 #include <gtest/gtest.h>
@@ -54,31 +54,31 @@ TEST_F(MeshFileTest, Obj) {
       EXPECT_NEAR(material.color.r, 0.21404, 1e-4);
       EXPECT_EQ(material.color.g, 1);
       EXPECT_EQ(material.alpha_mode, AlphaMode::opaque);
-      ASSERT_EQ(material.texture, 0);
+      ASSERT_EQ(material.picture, 0);
     } else {
       EXPECT_EQ(material.color.a, 0.25f);
       EXPECT_EQ(material.alpha_mode, AlphaMode::blend);
-      EXPECT_EQ(material.texture, -1);
+      EXPECT_EQ(material.picture, -1);
     }
   }
   EXPECT_EQ(names, (std::set<std::string>{"wall", "glass"}));
-  ASSERT_EQ(mesh.textures.size(), 1u);
+  ASSERT_EQ(mesh.pictures.size(), 1u);
   EXPECT_EQ(texel(mesh, 0, 0, 0), (std::array<int, 4>{255, 0, 0, 255}));
   EXPECT_EQ(texel(mesh, 0, 0, 1), (std::array<int, 4>{0, 0, 255, 255}));
-  EXPECT_FALSE(mesh.textures[0].has_alpha);
+  EXPECT_FALSE(mesh.pictures[0].has_alpha);
 }
 
 TEST_F(MeshFileTest, TheSameSquareOfEachFormat) {
   expect_square(read("a.obj", obj_square()));
   picture("a.png");
-  GltfSquare file;  // coordinates are read where there is a texture
+  GltfSquare file;  // coordinates are read where there is a picture
   file.material = R"({"pbrMetallicRoughness":{"baseColorTexture":{"index":0}}})";
   file.rest = R"(,"textures":[{"source":0}],"images":[{"uri":"a.png"}])";
   expect_square(read("a.gltf", file.gltf()));
   expect_square(read("a.glb", file.glb()));
 }
 
-TEST_F(MeshFileTest, PlyColoursAreStoredValues) {
+TEST_F(MeshFileTest, PlyColorsAreStoredValues) {
   for (const bool binary : {false, true}) {
     const Mesh mesh = read("a.ply", ply_triangle(binary));
     ASSERT_EQ(mesh.triangles.size(), 1u);
@@ -126,10 +126,10 @@ TEST_F(MeshFileTest, GltfMaterials) {
   EXPECT_EQ(material.color, glm::vec4(0.5f, 0.25f, 1, 0.75f));  // light, as it is
   EXPECT_EQ(material.alpha_mode, AlphaMode::mask);
   EXPECT_EQ(material.alpha_cutoff, 0.3f);
-  EXPECT_EQ(material.wrap_u, TextureWrap::mirror);
-  EXPECT_EQ(material.wrap_v, TextureWrap::clamp);
-  ASSERT_EQ(material.texture, 0);
-  EXPECT_TRUE(mesh.textures[0].has_alpha);
+  EXPECT_EQ(material.wrap_u, PictureWrap::mirror);
+  EXPECT_EQ(material.wrap_v, PictureWrap::clamp);
+  ASSERT_EQ(material.picture, 0);
+  EXPECT_TRUE(mesh.pictures[0].has_alpha);
   EXPECT_EQ(texel(mesh, 0, 0, 1), (std::array<int, 4>{0, 0, 255, 10}));
 
   file.material = R"({"alphaMode":"BLEND"})";
@@ -138,7 +138,7 @@ TEST_F(MeshFileTest, GltfMaterials) {
   EXPECT_EQ(read("b.gltf", file.gltf()).materials[0].alpha_mode, AlphaMode::opaque);
 }
 
-TEST_F(MeshFileTest, TransformsOfGltfTextures) {
+TEST_F(MeshFileTest, TransformsOfGltfPictures) {
   picture("a.png");
   GltfSquare file;
   file.rest = R"(,"textures":[{"source":0}],"images":[{"uri":"a.png"}])";
@@ -216,7 +216,7 @@ TEST_F(MeshFileTest, EveryShorterFileAndManyOthers) {
   }
 }
 
-TEST_F(MeshFileTest, EmbeddedTextures) {
+TEST_F(MeshFileTest, EmbeddedPictures) {
   const std::string png = picture("a.png");
   std::filesystem::remove(path("a.png"));
   GltfSquare file;
@@ -225,16 +225,16 @@ TEST_F(MeshFileTest, EmbeddedTextures) {
   file.views = fmt::format(R"(,{{"buffer":0,"byteOffset":92,"byteLength":{}}})", png.size());
   file.rest = R"(,"textures":[{"source":0}],"images":[{"bufferView":3,"mimeType":"image/png"}])";
   const Mesh glb = read("a.glb", file.glb());
-  ASSERT_EQ(glb.textures.size(), 1u);
+  ASSERT_EQ(glb.pictures.size(), 1u);
   EXPECT_EQ(texel(glb, 0, 1, 0), (std::array<int, 4>{0, 255, 0, 255}));
 
   file.rest = R"(,"textures":[{"source":0}],"images":[{"uri":"data:image/png;base64,)" + base64(png) + "\"}]";
   const Mesh gltf = read("a.gltf", file.gltf());
-  ASSERT_EQ(gltf.textures.size(), 1u);
+  ASSERT_EQ(gltf.pictures.size(), 1u);
   EXPECT_EQ(texel(gltf, 0, 0, 1), (std::array<int, 4>{0, 0, 255, 255}));
 }
 
-TEST_F(MeshFileTest, VertexColoursOfGltfAreLight) {
+TEST_F(MeshFileTest, VertexColorsOfGltfAreLight) {
   GltfSquare file;
   file.attributes = R"(,"COLOR_0":3)";
   file.accessors = R"(,{"bufferView":3,"componentType":5126,"count":4,"type":"VEC3"})";
@@ -256,21 +256,21 @@ TEST_F(MeshFileTest, VertexColoursOfGltfAreLight) {
 TEST_F(MeshFileTest, OpacityOfObj) {
   picture("color.png");
   picture("cut.png", {255, 0, 100, 255});
-  // By the texture's own alpha, by the alpha of a map, and by a map's brightness, which is stretched.
+  // By the picture's own alpha, by the alpha of a map, and by a map's brightness, which is stretched.
   put("m.mtl",
       "newmtl a\nmap_Kd cut.png\nnewmtl b\nmap_Kd color.png\nmap_d cut.png\nnewmtl c\nmap_d color.png\n");
   const Mesh mesh = read(
       "a.obj", obj_square("mtllib m.mtl\nusemtl a\n") + "usemtl b\nf 1/1 2/2 3/3\nusemtl c\nf 1/1 2/2 3/3\n");
-  ASSERT_EQ(mesh.textures.size(), 3u);
+  ASSERT_EQ(mesh.pictures.size(), 3u);
   for (const MeshMaterial& material : mesh.materials) {
-    if (material.texture < 0) continue;
+    if (material.picture < 0) continue;
     EXPECT_EQ(material.alpha_mode, AlphaMode::mask);
-    const auto alpha = texel(mesh, static_cast<size_t>(material.texture), 0, 1)[3];
+    const auto alpha = texel(mesh, static_cast<size_t>(material.picture), 0, 1)[3];
     EXPECT_EQ(alpha, material.name == "c" ? 29 : 100) << material.name;  // blue's part of the brightness
   }
 }
 
-TEST_F(MeshFileTest, NamesOfTextures) {
+TEST_F(MeshFileTest, NamesOfPictures) {
   std::filesystem::create_directories(path("Maps/deep"));
   picture("Maps/deep/Wall.PNG");
   picture("beside.png");
@@ -279,11 +279,11 @@ TEST_F(MeshFileTest, NamesOfTextures) {
         "C:\\work\\old\\Beside.png", "/nowhere/beside.png", "Maps/../beside.png"}) {
     put("m.mtl", fmt::format("newmtl a\nmap_Kd {}\n", name));
     const Mesh mesh = read("a.obj", obj_square("mtllib m.mtl\nusemtl a\n"));
-    EXPECT_EQ(mesh.textures.size(), 1u) << name;
+    EXPECT_EQ(mesh.pictures.size(), 1u) << name;
   }
 }
 
-TEST_F(MeshFileTest, TexturesOfOtherFormats) {
+TEST_F(MeshFileTest, PicturesOfOtherFormats) {
   // TGA: 2 x 2 texels of blue, green and red, from the top.
   std::string tga(18, '\0');
   tga[2] = 2, tga[12] = 2, tga[14] = 2, tga[16] = 24, tga[17] = 0x20;
@@ -298,10 +298,10 @@ TEST_F(MeshFileTest, TexturesOfOtherFormats) {
   put("m.mtl", "newmtl a\nmap_Kd a.tga\nnewmtl b\nmap_Kd a.png\nnewmtl c\nmap_Kd a.exr\n");
   const Mesh mesh = read(
       "a.obj", obj_square("mtllib m.mtl\nusemtl a\n") + "usemtl b\nf 1/1 2/2 3/3\nusemtl c\nf 1/1 2/2 3/3\n");
-  ASSERT_EQ(mesh.textures.size(), 3u);
+  ASSERT_EQ(mesh.pictures.size(), 3u);
   for (const MeshMaterial& material : mesh.materials) {
-    if (material.texture < 0) continue;
-    const auto have = texel(mesh, static_cast<size_t>(material.texture), 0, 0);
+    if (material.picture < 0) continue;
+    const auto have = texel(mesh, static_cast<size_t>(material.picture), 0, 0);
     const std::array<int, 4> want = material.name == "a"   ? std::array{3, 2, 1, 255}
                                     : material.name == "b" ? std::array{4, 4, 4, 255}
                                                            : std::array{188, 255, 0, 255};
@@ -321,7 +321,7 @@ TEST_F(MeshFileTest, WhatIsMissingIsNamed) {
   EXPECT_EQ(none.error().code, ErrorCode::input);
 }
 
-TEST_F(MeshFileTest, BrokenTextures) {
+TEST_F(MeshFileTest, BrokenPictures) {
   const std::string png = picture("a.png");
   put("m.mtl", "newmtl a\nmap_Kd a.png\n");
   const std::string obj = obj_square("mtllib m.mtl\nusemtl a\n");
@@ -341,7 +341,7 @@ TEST_F(MeshFileTest, BrokenTextures) {
   expect_error("a.glb", file.glb(), "expected PNG or JPEG");
 }
 
-TEST_F(MeshFileTest, LargeTexturesAreRefusedBeforeTheyAreDecoded) {
+TEST_F(MeshFileTest, LargePicturesAreRefusedBeforeTheyAreDecoded) {
   // Only their heads are there: 2^16 x 2^13 texels, and a side that is too long.
   put("m.mtl", "newmtl a\nmap_Kd a.png\n");
   const std::string obj = obj_square("mtllib m.mtl\nusemtl a\n");

@@ -283,7 +283,7 @@ TEST_F(NiftiPlaceTest, TimeAndChannelsAreChosen) {
   }
 }
 
-TEST_F(NiftiPlaceTest, ThreeOrFourPlanesOfBytesAreColours) {
+TEST_F(NiftiPlaceTest, ThreeOrFourPlanesOfBytesAreColors) {
   for (const bool packed : {false, true}) {
     NiftiHeader h = nifti_header(1, false, {2, 2, 1}, 2);
     h.dim(0, 5);

@@ -109,7 +109,7 @@ TEST_F(NrrdAxesTest, WhatIsDroppedIsNamed) {
   EXPECT_TRUE(notes_.empty()) << all_notes();
 }
 
-TEST_F(NrrdAxesTest, ColoursAreAnyAxis) {
+TEST_F(NrrdAxesTest, ColorsAreAnyAxis) {
   const std::string fields = "type: uchar\nencoding: raw\n";
   EXPECT_EQ(voxels_of_text(fields + "dimension: 4\nsizes: 2 2 1 3\nkinds: domain domain domain RGB-color",
                            "abcdABCD0123"),

@@ -58,7 +58,7 @@ TEST_F(ObjTest, PointsLinesAndWhatElseThereIs) {
   EXPECT_TRUE(read("v 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 3\n").notes.empty());
 }
 
-TEST_F(ObjTest, ColoursOfVertices) {
+TEST_F(ObjTest, ColorsOfVertices) {
   const Mesh mesh = read("v 0 0 0\nv 1 0 0 1 0.5 0\nv 0 1 0 1\nv 1 1 0 0 0 1 0.25\nf 1 2 3\nf 2 3 4\n");
   ASSERT_EQ(mesh.colors.size(), 4u);
   EXPECT_EQ(mesh.colors[0], glm::vec4(1));
@@ -130,11 +130,11 @@ TEST_F(ObjTest, OptionsOfMaps) {
   const Mesh one = with("map_Kd -s 2 f.png\n");
   for (size_t i = 0; i < one.positions.size(); ++i)
     EXPECT_EQ(one.uvs[i], glm::vec2(2 * one.positions[i].x, 1 - one.positions[i].y));
-  EXPECT_EQ(material_of(with("map_Kd -clamp on f.png\n")).wrap_u, TextureWrap::clamp);
+  EXPECT_EQ(material_of(with("map_Kd -clamp on f.png\n")).wrap_u, PictureWrap::clamp);
   EXPECT_EQ(material_of(with("map_Kd -clamp off -blendu on -texres 64 -bm 1 f.png\n")).wrap_u,
-            TextureWrap::repeat);
+            PictureWrap::repeat);
   for (const char* name : {"a name.png", "\"a name.png\"", "-clamp on a name.png"})
-    EXPECT_EQ(with(fmt::format("map_Kd {}\n", name)).textures.size(), 1u) << name;
+    EXPECT_EQ(with(fmt::format("map_Kd {}\n", name)).pictures.size(), 1u) << name;
   // Half of the range, from a quarter on.
   EXPECT_EQ(texel(with("map_Kd -mm 0.25 0.5 f.png\n"), 0, 0, 0), (std::array<int, 4>{191, 64, 64, 255}));
   // A channel of an opacity map.
@@ -149,14 +149,14 @@ TEST_F(ObjTest, OptionsOfMaps) {
   // What emits, by its own map: a map alone is seen.
   const Mesh lamp = with("Kd 0 0 0\nmap_Kd f.png\nmap_Ke -o 3 f.png\n");
   EXPECT_EQ(material_of(lamp).emission, glm::vec3(1));
-  EXPECT_EQ(material_of(lamp).emission_texture, 0);
+  EXPECT_EQ(material_of(lamp).emission_picture, 0);
   ASSERT_EQ(lamp.emission_uvs.size(), lamp.uvs.size());
   EXPECT_EQ(lamp.emission_uvs[0].x, lamp.uvs[0].x + 3);
-  // Faces without coordinates go without their texture, and that is said.
+  // Faces without coordinates go without their picture, and that is said.
   put("m.mtl", "newmtl a\nKd 0 1 0\nmap_Kd f.png\n");
   const Mesh mixed = read(obj_square("mtllib m.mtl\nusemtl a\n") + "f 1 2 3\n");
-  EXPECT_EQ(material_of(mixed, 0).texture, 0);
-  EXPECT_EQ(material_of(mixed, 2).texture, -1);
+  EXPECT_EQ(material_of(mixed, 0).picture, 0);
+  EXPECT_EQ(material_of(mixed, 2).picture, -1);
   EXPECT_EQ(material_of(mixed, 2).color, glm::vec4(0, 1, 0, 1));
   EXPECT_TRUE(has_note(mixed, "texture coordinates"));
 }

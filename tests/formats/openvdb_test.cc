@@ -163,7 +163,7 @@ TEST_F(OpenVdb, HugeVolumesOfFewVoxelsAreFast) {
   EXPECT_EQ((*source)->uniform({{0, 0, 4096}, {1 << 19, 1 << 19, 1 << 19}}), Voxel{});
 }
 
-TEST_F(OpenVdb, ColoursComeBackAndVoidIsBlack) {
+TEST_F(OpenVdb, ColorsComeBackAndVoidIsBlack) {
   const VolumeInfo rgba = make_info({20, 11, 9}, VoxelFormat::rgba32);
   Bytes voxels = random_voxels(rgba);
   for (size_t i = 0; i < voxels.size(); i += 4) voxels[i + 3] = std::byte(random_() % 2 ? 255 : 0);
@@ -268,9 +268,9 @@ std::string joined(const std::string& a, const std::string& b) {
 
 TEST_F(OpenVdb, GridsAreFoundByName) {
   const VolumeInfo density = make_info({3, 4, 5}, VoxelFormat::density8);
-  const VolumeInfo colour = make_info({6, 5, 4}, VoxelFormat::rgb24);
+  const VolumeInfo color = make_info({6, 5, 4}, VoxelFormat::rgb24);
   ASSERT_TRUE(write_vdb("density.vdb", density, random_voxels(density)));
-  ASSERT_TRUE(write_vdb("color.vdb", colour, random_voxels(colour)));
+  ASSERT_TRUE(write_vdb("color.vdb", color, random_voxels(color)));
   put("both.vdb", joined(get(path("density.vdb")), get(path("color.vdb"))));
   Bytes first, named, alone;
   const auto unnamed = open_vdb(path("both.vdb"), {}, ctx_);
@@ -375,7 +375,7 @@ TEST_F(OpenVdb, BitsAndIntegersAreKept) {
   EXPECT_EQ(back[2], std::byte{3});
 }
 
-TEST_F(OpenVdb, DoublesAreRoundedAndSaidAndVectorsAreColours) {
+TEST_F(OpenVdb, DoublesAreRoundedAndSaidAndVectorsAreColors) {
   std::string notes;
   ctx_.note = [&](const std::string& line) { notes += line; };
   put("a.vdb",

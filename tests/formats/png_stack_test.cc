@@ -24,14 +24,13 @@ OpenOptions with(const Set& set) {
 /// A PNG file by hand; `rows` with the byte of the filter before each.
 struct Png {
   uint32_t width = 1, height = 1;
-  uint8_t bits = 8, colour = 0;  // 0 grey, 2 RGB, 3 palette, 4 grey and alpha, 6 RGBA
+  uint8_t bits = 8, color = 0;  // 0 grey, 2 RGB, 3 palette, 4 grey and alpha, 6 RGBA
   std::string rows = {}, palette = {}, transparent = {}, physical = {};
 
   std::string bytes() const {
     std::string file = "\x89PNG\r\n\x1a\n";
-    chunk(
-        file, "IHDR",
-        be(width) + be(height) + static_cast<char>(bits) + static_cast<char>(colour) + std::string(3, '\0'));
+    chunk(file, "IHDR",
+          be(width) + be(height) + static_cast<char>(bits) + static_cast<char>(color) + std::string(3, '\0'));
     if (!palette.empty()) chunk(file, "PLTE", palette);
     if (!transparent.empty()) chunk(file, "tRNS", transparent);
     if (!physical.empty()) chunk(file, "pHYs", physical);
@@ -84,28 +83,28 @@ TEST_F(PngStack, SamplesAreKeptAsTheyAreStored) {
   EXPECT_EQ(read_file({.width = 3, .bits = 4, .rows = std::string("\0\x1f\x70", 3)}), "\x01\x0f\x07");
   EXPECT_EQ(read_file({.width = 2, .bits = 16, .rows = std::string("\0\1\2\3\4", 5)}), "\2\1\4\3");
   EXPECT_EQ(info_.sample_type, SampleType::u16);
-  EXPECT_EQ(read_file({.width = 1, .colour = 6, .rows = std::string("\0\1\2\3\0", 5)}),
+  EXPECT_EQ(read_file({.width = 1, .color = 6, .rows = std::string("\0\1\2\3\0", 5)}),
             std::string("\1\2\3\0", 4));
   EXPECT_EQ(read_file({.width = 2,
-                       .colour = 2,
+                       .color = 2,
                        .rows = std::string("\0abcdef", 7),
                        .transparent = std::string("\0d\0e\0f", 6)}),
             std::string("abc\xff"
                         "def\0",
                         8));
-  EXPECT_NE(read_file({.width = 1, .colour = 4, .rows = std::string("\0ab", 3)})
+  EXPECT_NE(read_file({.width = 1, .color = 4, .rows = std::string("\0ab", 3)})
                 .find("--channel N with a number from 0 to 1"),
             std::string::npos);
-  EXPECT_EQ(read_file({.width = 1, .colour = 4, .rows = std::string("\0ab", 3)},
+  EXPECT_EQ(read_file({.width = 1, .color = 4, .rows = std::string("\0ab", 3)},
                       with([&](OpenOptions& o) { o.channel = 1; })),
             "b");
-  EXPECT_EQ(read_file({.width = 1, .bits = 16, .colour = 2, .rows = std::string("\0\0a\0b\0c", 7)},
+  EXPECT_EQ(read_file({.width = 1, .bits = 16, .color = 2, .rows = std::string("\0\0a\0b\0c", 7)},
                       with([&](OpenOptions& o) { o.channel = 2; })),
             std::string("c\0", 2));
 }
 
-TEST_F(PngStack, PalettesAreGreyOrColoursOrLabels) {
-  Png png{.width = 4, .bits = 2, .colour = 3, .rows = std::string("\0\x1b", 2), .palette = "aaabbbcccddd"};
+TEST_F(PngStack, PalettesAreGreyOrColorsOrLabels) {
+  Png png{.width = 4, .bits = 2, .color = 3, .rows = std::string("\0\x1b", 2), .palette = "aaabbbcccddd"};
   EXPECT_EQ(read_file(png), "abcd");
   EXPECT_EQ(info_.format, VoxelFormat::density8);
   EXPECT_EQ(read_file(png, with([&](OpenOptions& o) { o.labels = true; })), std::string("\0\1\2\3", 4));
@@ -120,7 +119,7 @@ TEST_F(PngStack, PalettesAreGreyOrColoursOrLabels) {
             "ccc\xff"
             "ddd\xff");
   // Slices of one stack are alike.
-  png = {.width = 1, .colour = 3, .rows = std::string("\0\0", 2), .palette = "aaa"};
+  png = {.width = 1, .color = 3, .rows = std::string("\0\0", 2), .palette = "aaa"};
   put("s0.png", png.bytes());
   png.palette = "abc";
   put("s1.png", png.bytes());

@@ -423,7 +423,7 @@ TEST_F(TiffStack, StripsTilesAndPlanes) {
   EXPECT_NE(notes_.find("multiplied by alpha"), std::string::npos);
 }
 
-TEST_F(TiffStack, PalettesAreGreyOrColoursOrLabels) {
+TEST_F(TiffStack, PalettesAreGreyOrColorsOrLabels) {
   TiffBuilder tiff;
   tiff.pages = {grey_page(3, 1, 8, std::string("\0\1\xff", 3))};
   tiff.pages[0].tags[262] = {3};

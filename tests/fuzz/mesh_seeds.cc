@@ -6,7 +6,7 @@
 namespace voxkit::fuzz {
 namespace {
 
-/// With nodes, colours, a material with a texture transform, and an accessor that is partly zeros.
+/// With nodes, colours, a material with a picture transform, and an accessor that is partly zeros.
 GltfSquare rich_square() {
   GltfSquare file;
   file.attributes = R"(,"COLOR_0":3,"TEXCOORD_1":4)";

@@ -31,7 +31,7 @@ class MeshTest : public testing::Test {
     }
     mesh.triangles.push_back({{first, first + 1, first + 2}, material});
   }
-  /// A square at z = 0 from (0, 0) to (side, side) with the whole of a texture on it: v goes down as y goes
+  /// A square at z = 0 from (0, 0) to (side, side) with the whole of a picture on it: v goes down as y goes
   /// up.
   static void add_square(Mesh& mesh, double side, uint32_t material = 0, double z = 0, float uv = 1) {
     add_triangle(mesh, {{{0, 0, z}, {side, 0, z}, {0, side, z}}}, material, {{{0, uv}, {uv, uv}, {0, 0}}});
@@ -39,8 +39,8 @@ class MeshTest : public testing::Test {
                  {{{uv, 0}, {0, 0}, {uv, uv}}});
   }
   template <class TexelAt>
-  Texture texture(int64_t width, int64_t height, TexelAt texel_at) {
-    auto made = plain_texture(width, height, 0xff000000, ctx_);
+  Picture picture(int64_t width, int64_t height, TexelAt texel_at) {
+    auto made = plain_picture(width, height, 0xff000000, ctx_);
     EXPECT_TRUE(made);
     for (int64_t y = 0; y < height; ++y)
       for (int64_t x = 0; x < width; ++x) {

@@ -22,13 +22,13 @@ class VoxeliseColorTest : public MeshTest {
     EXPECT_NEAR(have.g, g, tolerance);
     EXPECT_NEAR(have.b, b, tolerance);
   }
-  /// A square of `resolution` voxels a side with a texture, and its colours at (x, y).
-  std::map<uint64_t, Rgb> draw(Texture picture, int64_t resolution, float uv, const MeshMaterial& material) {
+  /// A square of `resolution` voxels a side with a picture, and its colours at (x, y).
+  std::map<uint64_t, Rgb> draw(Picture picture, int64_t resolution, float uv, const MeshMaterial& material) {
     Mesh mesh;
     add_square(mesh, 1, 0, 0, uv);
     mesh.materials = {material};
-    mesh.materials[0].texture = 0;
-    mesh.textures.push_back(std::move(picture));
+    mesh.materials[0].picture = 0;
+    mesh.pictures.push_back(std::move(picture));
     return by_place(voxelise(std::move(mesh), {resolution}));
   }
   static uint64_t at(uint32_t x, uint32_t y) { return morton_code(x, y, 0); }
@@ -44,7 +44,7 @@ TEST_F(VoxeliseColorTest, TablesOfLight) {
     EXPECT_NEAR(tables.stored[i], stored(static_cast<double>(i) / 65535), 0.501);
 }
 
-TEST_F(VoxeliseColorTest, PlainColoursAreExact) {
+TEST_F(VoxeliseColorTest, PlainColorsAreExact) {
   for (int value = 0; value < 256; ++value) {
     const auto light = static_cast<float>(linear(value));
     Mesh mesh;
@@ -56,12 +56,12 @@ TEST_F(VoxeliseColorTest, PlainColoursAreExact) {
 }
 
 TEST_F(VoxeliseColorTest, TexelsOfTheVoxelsSize) {
-  // The first row of a texture is at the top, where y is large and v is 0.
+  // The first row of a picture is at the top, where y is large and v is 0.
   const auto color = [](int64_t x, int64_t y) {
     return std::array<uint8_t, 4>{static_cast<uint8_t>(100 + x * 8), static_cast<uint8_t>(100 + y * 8), 100,
                                   255};
   };
-  const auto voxels = draw(texture(16, 16, color), 16, 1, {});
+  const auto voxels = draw(picture(16, 16, color), 16, 1, {});
   ASSERT_EQ(voxels.size(), 256u);
   for (uint32_t y = 0; y < 16; ++y)
     for (uint32_t x = 0; x < 16; ++x)
@@ -74,10 +74,10 @@ TEST_F(VoxeliseColorTest, MeansAreOfLight) {
     const auto value = static_cast<uint8_t>((x ^ y) & 1 ? 255 : 0);
     return std::array<uint8_t, 4>{value, value, 0, 255};
   };
-  for (const auto& [place, color] : draw(texture(256, 256, checker), 16, 1, {}))
+  for (const auto& [place, color] : draw(picture(256, 256, checker), 16, 1, {}))
     expect_near(color, stored(0.5), stored(0.5), 0);
   // A side that is no power of two, in 10 x 10 voxels.
-  for (const auto& [place, color] : draw(texture(330, 330, checker), 10, 1, {}))
+  for (const auto& [place, color] : draw(picture(330, 330, checker), 10, 1, {}))
     expect_near(color, stored(0.5), stored(0.5), 0);
 }
 
@@ -88,23 +88,23 @@ TEST_F(VoxeliseColorTest, FootprintsBetweenLevels) {
     return std::array<uint8_t, 4>{value, value, value, 255};
   };
   for (const int64_t resolution : {20, 33, 100, 300, 700})
-    for (const auto& [place, color] : draw(texture(512, 4, ramp), resolution, 1, {})) {
+    for (const auto& [place, color] : draw(picture(512, 4, ramp), resolution, 1, {})) {
       const double x = (morton_place(place).x + 0.5) / static_cast<double>(resolution);
-      if (x < 0.15 || x > 0.85) continue;  // the texture goes on at the other side
+      if (x < 0.15 || x > 0.85) continue;  // the picture goes on at the other side
       EXPECT_NEAR(linear(color.r), x, 0.012) << resolution;
     }
 }
 
-TEST_F(VoxeliseColorTest, BeyondTheTexture) {
+TEST_F(VoxeliseColorTest, BeyondThePicture) {
   const auto halves = [](int64_t x, int64_t y) {
     return std::array<uint8_t, 4>{static_cast<uint8_t>(x < 8 ? 255 : 0),
                                   static_cast<uint8_t>(y < 8 ? 255 : 0), 0, 255};
   };
-  // Three textures a side, of 8 voxels each: what is at the quarters of each half.
-  const auto check = [&](TextureWrap wrap, const std::array<bool, 6>& lit) {
+  // Three pictures a side, of 8 voxels each: what is at the quarters of each half.
+  const auto check = [&](PictureWrap wrap, const std::array<bool, 6>& lit) {
     MeshMaterial material;
     material.wrap_u = material.wrap_v = wrap;
-    const auto voxels = draw(texture(16, 16, halves), 24, 3, material);
+    const auto voxels = draw(picture(16, 16, halves), 24, 3, material);
     for (uint32_t half = 0; half < 6; ++half) {
       const double want = lit[half] ? 255 : 0;
       expect_near(voxels.at(at(half * 4 + 1, 22)), want, voxels.at(at(1, 22)).g, 0, 2);
@@ -112,18 +112,18 @@ TEST_F(VoxeliseColorTest, BeyondTheTexture) {
       EXPECT_NEAR(voxels.at(at(1, 23 - (half * 4 + 1))).g, want, 2) << half;
     }
   };
-  check(TextureWrap::repeat, {true, false, true, false, true, false});
-  check(TextureWrap::mirror, {true, false, false, true, true, false});
-  check(TextureWrap::clamp, {true, false, false, false, false, false});
+  check(PictureWrap::repeat, {true, false, true, false, true, false});
+  check(PictureWrap::mirror, {true, false, false, true, true, false});
+  check(PictureWrap::clamp, {true, false, false, false, false, false});
 }
 
 TEST_F(VoxeliseColorTest, MaterialsAndCornersMultiply) {
   Mesh mesh;
-  mesh.textures.push_back(texture(1, 1, [](int64_t, int64_t) {
+  mesh.pictures.push_back(picture(1, 1, [](int64_t, int64_t) {
     return std::array<uint8_t, 4>{200, 100, 50, 255};
   }));
   mesh.materials = {plain(0.5f, 1, 0.25f)};
-  mesh.materials[0].texture = 0;
+  mesh.materials[0].picture = 0;
   add_square(mesh, 1);
   for (const glm::dvec3& p : mesh.positions) mesh.colors.push_back({static_cast<float>(p.x), 1, 0.5f, 1});
   const auto voxels = by_place(voxelise(std::move(mesh), {10}));
@@ -185,7 +185,7 @@ TEST_F(VoxeliseColorTest, CutOff) {
     material.alpha_mode = mode;
     material.alpha_cutoff = cutoff;
     material.color.a = factor;
-    const auto voxels = draw(texture(16, 16, leaf), 16, 1, material);
+    const auto voxels = draw(picture(16, 16, leaf), 16, 1, material);
     EXPECT_EQ(voxels.size(), columns * 16);
     for (const auto& [place, color] : voxels) {
       const uint32_t x = morton_place(place).x;
@@ -232,18 +232,18 @@ TEST_F(VoxeliseColorTest, WhatIsBlendedIsThereFromAHalfOn) {
 }
 
 TEST_F(VoxeliseColorTest, EmissionIsAdded) {
-  const auto lamp = [&](bool add, bool textured) {
+  const auto lamp = [&](bool add, bool pictured) {
     Mesh mesh;
     mesh.materials = {plain(0.25f, 0, 0)};
     mesh.materials[0].emission = {0.25f, 0.5f, 4};
     add_square(mesh, 1);
-    if (textured) {
+    if (pictured) {
       // Its own coordinates: what is black in the lower half there is to the left.
-      mesh.textures.push_back(texture(16, 16, [](int64_t x, int64_t) {
+      mesh.pictures.push_back(picture(16, 16, [](int64_t x, int64_t) {
         const auto value = static_cast<uint8_t>(x < 8 ? 0 : 255);
         return std::array<uint8_t, 4>{value, value, value, 255};
       }));
-      mesh.materials[0].emission_texture = 0;
+      mesh.materials[0].emission_picture = 0;
       for (const glm::dvec3& p : mesh.positions) mesh.emission_uvs.push_back(glm::vec2(p.y, p.x));
     }
     auto surface = make_surface(std::move(mesh), {.resolution = 16, .emission = add}, ctx_);
@@ -272,17 +272,17 @@ TEST_F(VoxeliseColorTest, NearestTexelsAreAsTheyAre) {
     return std::array<uint8_t, 4>{value, value, value, 255};
   };
   MeshMaterial material;
-  material.filter = TextureFilter::nearest;
-  for (const TextureWrap wrap : {TextureWrap::repeat, TextureWrap::clamp, TextureWrap::mirror}) {
+  material.filter = PictureFilter::nearest;
+  for (const PictureWrap wrap : {PictureWrap::repeat, PictureWrap::clamp, PictureWrap::mirror}) {
     material.wrap_u = material.wrap_v = wrap;
-    for (const auto& [place, color] : draw(texture(4, 4, chess), 32, 1, material)) {
+    for (const auto& [place, color] : draw(picture(4, 4, chess), 32, 1, material)) {
       const auto p = morton_place(place);
       const int want = ((p.x / 8) ^ ((31 - p.y) / 8)) & 1 ? 255 : 0;
       EXPECT_EQ(color.r, want) << p.x << " " << p.y;
     }
   }
   // Smaller than voxels they are averaged all the same.
-  for (const auto& [place, color] : draw(texture(64, 64, chess), 8, 1, material))
+  for (const auto& [place, color] : draw(picture(64, 64, chess), 8, 1, material))
     expect_near(color, stored(0.5), stored(0.5), stored(0.5));
 }
 
@@ -308,9 +308,9 @@ TEST_F(VoxeliseColorTest, PointsOfMeshes) {
   EXPECT_FALSE(make_surface(mesh_of(false, 0), {8}, ctx_));
 }
 
-TEST_F(VoxeliseColorTest, TextureCoordinatesOfAnySize) {
+TEST_F(VoxeliseColorTest, PictureCoordinatesOfAnySize) {
   for (const float uv : {1e6f, 1e20f, 3e38f}) {
-    const auto voxels = draw(texture(16, 16,
+    const auto voxels = draw(picture(16, 16,
                                      [](int64_t x, int64_t) {
                                        const auto value = static_cast<uint8_t>(x & 1 ? 255 : 0);
                                        return std::array<uint8_t, 4>{value, value, value, 255};

@@ -165,13 +165,13 @@ TEST_F(VoxeliseTest, WaysToDivideTheWork) {
     for (const int tile_bits : {0, 1, 3, 6, 8}) {
       random_.seed(3);
       Mesh mesh = random_mesh(200);
-      mesh.textures.push_back(texture(32, 32, [&](int64_t, int64_t) {
+      mesh.pictures.push_back(picture(32, 32, [&](int64_t, int64_t) {
         return std::array<uint8_t, 4>{static_cast<uint8_t>(random_()), static_cast<uint8_t>(random_()), 7,
                                       static_cast<uint8_t>(random_())};
       }));
       for (glm::vec2& uv : mesh.uvs)
         uv = {static_cast<float>(random_() % 100) / 30, static_cast<float>(random_() % 100) / 30};
-      mesh.materials[0].texture = mesh.materials[1].texture = 0;
+      mesh.materials[0].picture = mesh.materials[1].picture = 0;
       mesh.materials[1].alpha_mode = AlphaMode::blend;
       // The order of the triangles does not matter, either.
       if (threads == 2) std::reverse(mesh.triangles.begin(), mesh.triangles.end());

@@ -17,7 +17,7 @@ namespace {
 
 using Kind = ErrorHistogram::Kind;
 using test::bytes_of;
-using test::colour_info;
+using test::color_info;
 using test::FlatSource;
 using test::MemorySource;
 using test::scalar_info;
@@ -126,8 +126,8 @@ TEST_F(HistogramOfTest, VolumesOfEveryKind) {
   expect_volume<uint8_t>(Kind::bytes, scalar_info(dims, SampleType::u8), memory_, 256);
   expect_volume<uint16_t>(Kind::whole, scalar_info(dims, SampleType::u16), memory_, 65536);
   expect_volume<float>(Kind::real, scalar_info(dims, SampleType::f32), memory_, 1 << 24);
-  expect_volume<uint8_t>(Kind::bytes, colour_info({90, 30, 20}, VoxelFormat::rgb24), memory_, 256);
-  expect_volume<uint8_t>(Kind::bytes, colour_info({90, 30, 20}, VoxelFormat::rgba32), memory_, 256);
+  expect_volume<uint8_t>(Kind::bytes, color_info({90, 30, 20}, VoxelFormat::rgb24), memory_, 256);
+  expect_volume<uint8_t>(Kind::bytes, color_info({90, 30, 20}, VoxelFormat::rgba32), memory_, 256);
 }
 
 TEST_F(HistogramOfTest, UniformVolumesAreCountedWithoutBeingRead) {

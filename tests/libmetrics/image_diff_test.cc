@@ -41,7 +41,7 @@ TEST_F(ImageDiffTest, AgreesWithTextbookSums) {
     for (const int channels : {1, 2, 3, 4}) {
       const Image a = noise(171, 103, channels, type, 1);
       Image b = noise(171, 103, channels, type, 2);
-      long double squares = 0, colour_squares = 0, greatest = 0;
+      long double squares = 0, color_squares = 0, greatest = 0;
       int64_t differing = 0;
       for (int64_t y = 0; y < 103; ++y)
         for (int64_t x = 0; x < 171; ++x) {
@@ -51,7 +51,7 @@ TEST_F(ImageDiffTest, AgreesWithTextbookSums) {
             if ((x + y) % 3 == 0) sample = a.row(y)[x * channels + c];
             const long double d = std::abs(static_cast<long double>(a.row(y)[x * channels + c]) - sample);
             squares += d * d;
-            if (c < 3) colour_squares += d * d;
+            if (c < 3) color_squares += d * d;
             greatest = std::max(greatest, d);
             differs |= d != 0;
           }
@@ -71,7 +71,7 @@ TEST_F(ImageDiffTest, AgreesWithTextbookSums) {
       EXPECT_EQ(got.differing_pixels, differing);
       ASSERT_EQ(got.grmse.has_value(), channels > 2);
       if (got.grmse) {
-        const double rms = std::sqrt(static_cast<double>(colour_squares) / pixels) * 255 / peak;
+        const double rms = std::sqrt(static_cast<double>(color_squares) / pixels) * 255 / peak;
         EXPECT_NEAR(*got.grmse_distance / rms, 1, 1e-12);
         EXPECT_NEAR(*got.grmse / (rms / std::sqrt(3.0)), 1, 1e-12);
       }

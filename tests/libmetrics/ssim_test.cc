@@ -254,10 +254,10 @@ TEST_F(SsimTest, Refuses) {
 }
 
 TEST_F(SsimTest, LumaAndChannels) {
-  const Image colour = picture(9, 4, 4, SampleType::u8, ctx_, [](int64_t x, int64_t y, int c) {
+  const Image color = picture(9, 4, 4, SampleType::u8, ctx_, [](int64_t x, int64_t y, int c) {
     return static_cast<double>(7 * x + 30 * y + 11 * c);
   });
-  const auto grey = luma(colour, ctx_), green = channel(colour, 1, ctx_), alpha = channel(colour, 3, ctx_);
+  const auto grey = luma(color, ctx_), green = channel(color, 1, ctx_), alpha = channel(color, 3, ctx_);
   ASSERT_TRUE(grey && green && alpha);
   for (int64_t y = 0; y < 4; ++y)
     for (int64_t x = 0; x < 9; ++x) {

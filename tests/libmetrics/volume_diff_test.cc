@@ -13,7 +13,7 @@ namespace voxkit {
 namespace {
 
 using test::bytes_of;
-using test::colour_info;
+using test::color_info;
 using test::FlatSource;
 using test::ForwardSource;
 using test::MemorySink;
@@ -119,7 +119,7 @@ TEST_F(VolumeDiffTest, SameForAnyThreadsAndKindOfSource) {
   }
 }
 
-TEST_F(VolumeDiffTest, Colours) {
+TEST_F(VolumeDiffTest, Colors) {
   const Index3 dims(40, 5, 3);
   const auto a = random_values<uint8_t>(600 * 4, 1, 256), b = random_values<uint8_t>(600 * 4, 2, 256);
   Plain all, rgb;
@@ -127,7 +127,7 @@ TEST_F(VolumeDiffTest, Colours) {
     all.add(a[i], b[i]);
     if (i % 4 < 3) rgb.add(a[i], b[i]);
   }
-  const VolumeDiff d = diff(colour_info(dims, VoxelFormat::rgba32), a, b);
+  const VolumeDiff d = diff(color_info(dims, VoxelFormat::rgba32), a, b);
   EXPECT_EQ(d.peak, 255);
   EXPECT_DOUBLE_EQ(d.mse, static_cast<double>(all.squares / 2400));
   EXPECT_DOUBLE_EQ(*d.grmse, static_cast<double>(std::sqrt(rgb.squares / 1800)));
@@ -135,8 +135,8 @@ TEST_F(VolumeDiffTest, Colours) {
   EXPECT_DOUBLE_EQ(d.snr_db, static_cast<double>(10 * std::log10(all.signal / all.squares)));
 
   const VolumeDiff mixed =
-      diff(*volume(colour_info({1, 1, 1}, VoxelFormat::rgb24), std::vector<uint8_t>{1, 2, 3}),
-           *volume(colour_info({1, 1, 1}, VoxelFormat::rgba32), std::vector<uint8_t>{1, 2, 3, 251}));
+      diff(*volume(color_info({1, 1, 1}, VoxelFormat::rgb24), std::vector<uint8_t>{1, 2, 3}),
+           *volume(color_info({1, 1, 1}, VoxelFormat::rgba32), std::vector<uint8_t>{1, 2, 3, 251}));
   EXPECT_EQ(mixed.mse, 4);
   EXPECT_EQ(*mixed.grmse, 0);
 }
@@ -188,7 +188,7 @@ TEST_F(VolumeDiffTest, ErrorVolume) {
   const Index3 dims(50, 40, 30);
   const auto a = random_values<uint8_t>(60000, 1, 256), b = random_values<uint8_t>(60000, 2, 256);
   for (const VoxelFormat format : {VoxelFormat::density8, VoxelFormat::rgb24}) {
-    VolumeInfo info = colour_info(format == VoxelFormat::rgb24 ? Index3(50, 40, 10) : dims, format);
+    VolumeInfo info = color_info(format == VoxelFormat::rgb24 ? Index3(50, 40, 10) : dims, format);
     MemorySource source_a(info, bytes_of(a)), source_b(info, bytes_of(b));
     EXPECT_EQ(error_volume_info(info, info).format, format);
     MemorySink sink(info.dims, format);
@@ -215,8 +215,8 @@ TEST_F(VolumeDiffTest, RefusesWhatCannotBeCompared) {
   Context ctx{.threads = 1, .memory = &memory_};
   auto a = volume(scalar_info({2, 1, 1}, SampleType::u8), std::vector<uint8_t>(2));
   auto longer = volume(scalar_info({3, 1, 1}, SampleType::u8), std::vector<uint8_t>(3));
-  auto colour = volume(colour_info({2, 1, 1}, VoxelFormat::rgb24), std::vector<uint8_t>(6));
-  for (VolumeSource* b : {longer.get(), colour.get()}) {
+  auto color = volume(color_info({2, 1, 1}, VoxelFormat::rgb24), std::vector<uint8_t>(6));
+  for (VolumeSource* b : {longer.get(), color.get()}) {
     const auto d = diff_volumes(*a, *b, {}, nullptr, ctx);
     ASSERT_FALSE(d);
     EXPECT_EQ(d.error().code, ErrorCode::usage);
@@ -226,7 +226,7 @@ TEST_F(VolumeDiffTest, RefusesWhatCannotBeCompared) {
 TEST(FullScale, OfEveryFormat) {
   EXPECT_EQ(full_scale(scalar_info({1, 1, 1}, SampleType::bit), {}), 1);
   EXPECT_EQ(full_scale(scalar_info({1, 1, 1}, SampleType::i8), {}), 255);
-  EXPECT_EQ(full_scale(colour_info({1, 1, 1}, VoxelFormat::rgb24), {}), 255);
+  EXPECT_EQ(full_scale(color_info({1, 1, 1}, VoxelFormat::rgb24), {}), 255);
   EXPECT_EQ(full_scale(scalar_info({1, 1, 1}, SampleType::u16), {1000, 4095}), 4095);
   EXPECT_EQ(full_scale(scalar_info({1, 1, 1}, SampleType::u16), {0, 4096}), 8191);
   EXPECT_EQ(full_scale(scalar_info({1, 1, 1}, SampleType::u16), {0, 0}), 1);

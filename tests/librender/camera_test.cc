@@ -57,6 +57,37 @@ TEST(Camera, TransformPutsTheLongestSideFromMinusAHalfToAHalf) {
   EXPECT_NEAR(corner.z, 5, 1e-9);
 }
 
+TEST(Camera, AxesPointWhereTheAffineSays) {
+  VolumeInfo info;
+  info.dims = {10, 20, 5};
+  info.affine = {{{{0, -2, 0}, {0, 0, 1}, {3, 0, 1}}}, {7, 8, 9}};
+  info.world = World::ras;
+  const GridTransform transform(info);
+  const double longest = 20;  // along x and y alike
+  // Two voxels along x and y from the middle, and one along z.
+  const glm::dvec3 place = glm::dvec3(3, -4, 2 + 1) / longest;
+  const glm::dvec3 at = transform.point(place);
+  EXPECT_NEAR(at.x, 5 + 2, 1e-9);
+  EXPECT_NEAR(at.y, 10 + 2, 1e-9);
+  EXPECT_NEAR(at.z, 2.5 + 1, 1e-9);
+  const glm::dvec3 along_z = transform.direction(glm::dvec3(3, 0, 1) / longest);
+  EXPECT_NEAR(along_z.x, 0, 1e-9);
+  EXPECT_NEAR(along_z.y, 0, 1e-9);
+  EXPECT_NEAR(along_z.z, 1, 1e-9);
+  for (int i = 0; i < 8; ++i) {
+    const glm::dvec3 corner = transform.point(transform.corner(i));
+    EXPECT_NEAR(corner.x, i & 1 ? 10 : 0, 1e-9);
+    EXPECT_NEAR(corner.y, i & 2 ? 20 : 0, 1e-9);
+    EXPECT_NEAR(corner.z, i & 4 ? 5 : 0, 1e-9);
+    EXPECT_LE(glm::length(transform.corner(i)), transform.radius());
+  }
+  // The same patient in another world is the same picture.
+  VolumeInfo other = info;
+  other.affine = in_world(info.affine, World::ras, World::lps);
+  other.world = World::lps;
+  EXPECT_EQ(GridTransform(other).along, transform.along);
+}
+
 class CameraFile : public testing::Test {
  protected:
   CameraFile() {

@@ -53,7 +53,7 @@ void expect_same_pixels(const Frame& a, const Frame& b, double tolerance) {
     for (int k = 0; k < 3; ++k) ASSERT_EQ(a.details[i].voxel[k], b.details[i].voxel[k]) << "pixel " << i;
     ASSERT_EQ(a.pixels[i].distance, b.pixels[i].distance) << "pixel " << i;
     for (int k = 0; k < 4; ++k)
-      ASSERT_NEAR(a.pixels[i].colour[k], b.pixels[i].colour[k], tolerance) << "pixel " << i;
+      ASSERT_NEAR(a.pixels[i].color[k], b.pixels[i].color[k], tolerance) << "pixel " << i;
   }
 }
 

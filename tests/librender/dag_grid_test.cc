@@ -74,8 +74,7 @@ TEST(DagGrid, PicturesAreThoseOfTheVoxels) {
               ASSERT_TRUE(cast(grid, camera, options, frame, f.ctx));
               EXPECT_EQ(frame.rays_hit, expected.rays_hit);
               for (size_t i = 0; i < frame.pixels.size(); ++i) {
-                for (int k = 0; k < 4; ++k)
-                  ASSERT_EQ(frame.pixels[i].colour[k], expected.pixels[i].colour[k]);
+                for (int k = 0; k < 4; ++k) ASSERT_EQ(frame.pixels[i].color[k], expected.pixels[i].color[k]);
                 ASSERT_EQ(frame.pixels[i].distance, expected.pixels[i].distance);
                 for (int a = 0; a < 3; ++a)
                   ASSERT_EQ(frame.details[i].voxel[a], expected.details[i].voxel[a]);
@@ -117,7 +116,7 @@ TEST(DagGrid, LevelsOfDetail) {
   options.level_of_detail = true;
   ASSERT_TRUE(cast(grid, Camera::orbit(30, 20, 0.6, 20), options, some, f.ctx));
   for (size_t i = 0; i < all.pixels.size(); ++i)
-    for (int k = 0; k < 4; ++k) ASSERT_EQ(all.pixels[i].colour[k], some.pixels[i].colour[k]);
+    for (int k = 0; k < 4; ++k) ASSERT_EQ(all.pixels[i].color[k], some.pixels[i].color[k]);
   // From afar each pixel has the colour of a node around the voxel, as large as the cone there or half of it.
   const Camera far = Camera::orbit(30, 20, 12, 45);
   for (const Traversal traversal : {Traversal::path, Traversal::restart}) {
@@ -137,9 +136,9 @@ TEST(DagGrid, LevelsOfDetail) {
         const color::Found cell = color::find_cell(**dag, place, h);
         if (!cell.there) continue;
         const color::Rgb c = *(*volume)->color(cell.color);
-        const bool same = std::abs(some.pixels[i].colour[0] * 255 - c.r) < 0.01f &&
-                          std::abs(some.pixels[i].colour[1] * 255 - c.g) < 0.01f &&
-                          std::abs(some.pixels[i].colour[2] * 255 - c.b) < 0.01f;
+        const bool same = std::abs(some.pixels[i].color[0] * 255 - c.r) < 0.01f &&
+                          std::abs(some.pixels[i].color[1] * 255 - c.g) < 0.01f &&
+                          std::abs(some.pixels[i].color[2] * 255 - c.b) < 0.01f;
         found |= same;
         coarse |= same && h > 2;
       }

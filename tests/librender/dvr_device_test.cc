@@ -200,7 +200,7 @@ TEST(DvrDevice, DamagedChunksAndCodewordsAreNotReadPast) {
           WarpPicture{frame.pixels.data() + at, frame.details.data() + at, frame.costs.data() + at}};
       ASSERT_TRUE(backend->run_groups("rendering", kernel, ctx));
       ASSERT_TRUE(blank_around(*job, frame, ctx));
-      for (const Pixel& pixel : frame.pixels) ASSERT_TRUE(pixel.colour[3] >= 0 && pixel.colour[3] <= 1);
+      for (const Pixel& pixel : frame.pixels) ASSERT_TRUE(pixel.color[3] >= 0 && pixel.color[3] <= 1);
     }
   }
 }

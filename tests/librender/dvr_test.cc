@@ -86,7 +86,7 @@ class Reference {
       const double p = -from[a] / way[a], q = (side - from[a]) / way[a];
       t0 = std::max(t0, std::min(p, q)), t1 = std::min(t1, std::max(p, q));
     }
-    glm::dvec3 colour(0);
+    glm::dvec3 color(0);
     double through = 1;
     for (double k = std::ceil(t0 / step); k * step <= t1 && through > 0.005; ++k) {
       const glm::dvec3 at = from + way * (k * step) - 0.5;
@@ -95,10 +95,10 @@ class Reference {
       glm::dvec3 shown(rgba[0], rgba[1], rgba[2]);
       if (options_.lit) shown = lit(shown, at, glm::normalize(world));
       const double alpha = 1 - std::pow(1 - rgba[3], options_.step / along);
-      colour += through * alpha * shown;
+      color += through * alpha * shown;
       through *= 1 - alpha;
     }
-    return {colour, 1 - through};
+    return {color, 1 - through};
   }
 
   double value(glm::dvec3 at) const {
@@ -125,7 +125,7 @@ class Reference {
   }
 
  private:
-  glm::dvec3 lit(const glm::dvec3& colour, const glm::dvec3& at, const glm::dvec3& ahead) const {
+  glm::dvec3 lit(const glm::dvec3& color, const glm::dvec3& at, const glm::dvec3& ahead) const {
     glm::dvec3 gradient;
     for (int a = 0; a < 3; ++a) {  // of the cell, in which values are linear along each axis
       const double side = static_cast<double>(grid_.info().dims[a]);
@@ -134,11 +134,12 @@ class Reference {
       hi[a] = lo[a] + 1;
       gradient[a] = (value(hi) - value(lo)) / transform_.voxel[a];
     }
-    if (glm::length(gradient) == 0) return colour;
+    if (glm::length(gradient) == 0) return color;
+    gradient = glm::transpose(transform_.along) * gradient;
     glm::dvec3 normal = glm::normalize(gradient);
     if (glm::dot(normal, ahead) > 0) normal = -normal;
     const glm::dvec3 light = light_of(rays_), half = glm::normalize(light - ahead);
-    return colour * (0.3 + 0.6 * std::max(0.0, glm::dot(normal, light))) +
+    return color * (0.3 + 0.6 * std::max(0.0, glm::dot(normal, light))) +
            0.15 * std::pow(std::max(0.0, glm::dot(normal, half)), 32);
   }
   const DenseGrid& grid_;
@@ -148,30 +149,31 @@ class Reference {
   RayGenerator rays_;
 };
 
-/// A built-in with voxels of these edges.
-class Stretched final : public VolumeSource {
+/// A built-in that is somewhere else.
+class Placed final : public VolumeSource {
  public:
-  Stretched(std::unique_ptr<VolumeSource> source, std::array<double, 3> spacing)
-      : source_(std::move(source)) {
+  Placed(std::unique_ptr<VolumeSource> source, const Affine& affine) : source_(std::move(source)) {
     info_ = source_->info();
-    info_.affine = Affine::plain(spacing, info_.affine.origin);
+    info_.affine = affine;
   }
   Status read(const Box& box, VoxelSpan out) override { return source_->read(box, out); }
 
  private:
   std::unique_ptr<VolumeSource> source_;
 };
-std::unique_ptr<VolumeSource> stretched(const char* name, std::array<double, 3> spacing) {
-  return std::make_unique<Stretched>(std::move(*open_builtin(name)), spacing);
-}
 
 TEST(Dvr, IsThePlainRenderer) {
-  const std::array<double, 3> spacings[] = {{1, 1, 1}, {1, 0.5, 1.28}};
+  const Affine affines[] = {
+      Affine::plain({1, 1, 1}, {}),
+      Affine::plain({1, 0.5, 1.28}, {}),
+      {{{{0, -1, 0}, {0, 0, 0.5}, {1.28, 0, 0}}}, {5, 6, 7}},              // permuted and mirrored
+      {{{{1, 0.2, -0.1}, {0.3, 0.9, 0.4}, {-0.2, 0.5, 1.5}}}, {0, 0, 1}},  // sheared
+  };
   for (const char* name : {"marschner-lobb:21", "sphere:24", "noise:9:5"})
-    for (const auto& spacing : spacings)
+    for (const Affine& affine : affines)
       for (const bool lit : {false, true}) {
-        const auto source = stretched(name, spacing);
-        const auto grid = dense(*source);
+        Placed source(std::move(*open_builtin(name)), affine);
+        const auto grid = dense(source);
         const TransferFunction transfer = ramp(90, 210);
         DvrOptions options = small(0.37);
         options.lit = lit;
@@ -185,7 +187,7 @@ TEST(Dvr, IsThePlainRenderer) {
             const glm::dvec4 expected = reference.pixel(x, y);
             const Pixel& pixel = frame.pixels[static_cast<size_t>(y * options.width + x)];
             for (int k = 0; k < 4; ++k) {
-              const double off = std::abs(static_cast<double>(pixel.colour[k]) - expected[k]);
+              const double off = std::abs(static_cast<double>(pixel.color[k]) - expected[k]);
               worst = std::max(worst, off), sum += off;
             }
           }
@@ -268,7 +270,7 @@ TEST(Dvr, NoNumberAndInfinityShowNothingAndBreakNothing) {
     const Frame frame = draw(scene, Camera::orbit(20, 30, 1.5, 45), options);
     EXPECT_GT(frame.rays_hit, 100u);
     for (const Pixel& pixel : frame.pixels)
-      for (const float c : pixel.colour) ASSERT_TRUE(c >= 0 && c <= 1.5f) << c;
+      for (const float c : pixel.color) ASSERT_TRUE(c >= 0 && c <= 1.5f) << c;
     options.skip = false;
     expect_same(draw(scene, Camera::orbit(20, 30, 1.5, 45), options), frame);
   }
@@ -286,7 +288,7 @@ TEST(Dvr, OpacityDoesNotDependOnTheStepOrTheAngle) {
     options.lit = false;
     const Frame frame = draw(scene, camera, options);
     const Pixel& middle = frame.pixels[static_cast<size_t>(26 * 75 + 37)];
-    EXPECT_NEAR(middle.colour[3], 1 - std::exp2(-8.0), 0.004);
+    EXPECT_NEAR(middle.color[3], 1 - std::exp2(-8.0), 0.004);
     EXPECT_NEAR(middle.distance, 2.5, step / 8 + 1e-6);
   }
 }
@@ -341,7 +343,7 @@ TEST(Dvr, NarrowFieldsOfViewHaveTheGradientsOfCells) {
   expect_same(draw(scene, camera, options), expected);
 }
 
-TEST(Dvr, ColoursAndTooManySamplesAreRefused) {
+TEST(Dvr, ColorsAndTooManySamplesAreRefused) {
   Context ctx = context();
   auto source = open_builtin("menger:1");
   const auto refused = DvrVolume::open(dense(**source), ctx);
@@ -417,7 +419,7 @@ TEST(Dvr, WhatIsNoNumberIsVoidAndChangesNothingElse) {
     }
   }
   for (const Pixel& pixel : frames.front().pixels)
-    for (const float c : pixel.colour) EXPECT_TRUE(c >= 0 && c <= 1);
+    for (const float c : pixel.color) EXPECT_TRUE(c >= 0 && c <= 1);
 }
 
 }  // namespace

@@ -51,7 +51,7 @@ class ShadeTest : public testing::Test {
         }
         Pixel& pixel = frame.pixels[static_cast<size_t>(y * width + x)];
         pixel.distance = static_cast<float>(t);
-        for (float& c : pixel.colour) c = 1;
+        for (float& c : pixel.color) c = 1;
       }
       return {};
     }));
@@ -186,14 +186,14 @@ TEST_F(ShadeTest, OpennessIsThatOfTheSurface) {
   EXPECT_LT(rough, pixels / 100);
 }
 
-TEST_F(ShadeTest, WithoutShadingTheColoursAreThoseGathered) {
+TEST_F(ShadeTest, WithoutShadingTheColorsAreThoseGathered) {
   Frame frame;
   frame.width = 2;
   frame.height = 1;
   frame.pixels.resize(2);
   frame.pixels[0].distance = 1;
   const float gathered[] = {0.25f, 0.125f, 0, 0.5f};
-  std::copy_n(gathered, 4, frame.pixels[0].colour);
+  std::copy_n(gathered, 4, frame.pixels[0].color);
   Context ctx = context();
   const ShadeOptions options{.phong = false, .background = {1, 0.5f, 0}};
   const auto picture = shade(frame, Camera{}, 0.01, options, ctx);

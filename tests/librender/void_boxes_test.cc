@@ -31,9 +31,9 @@ class VoidBoxTest : public testing::TestWithParam<const char*> {
     }
     std::nth_element(values.begin(), values.begin() + static_cast<int64_t>(values.size() / 2), values.end());
     const double median = values[values.size() / 2];
-    colour_of_ = ColourOf(info_.format, {median, median + 1});
+    color_of_ = ColorOf(info_.format, {median, median + 1});
   }
-  bool is_void(const Voxel& v) const { return colour_of_.is_void(v); }
+  bool is_void(const Voxel& v) const { return color_of_.is_void(v); }
   bool is_void_at(int64_t x, int64_t y, int64_t z) const {
     const auto bytes = static_cast<size_t>(voxel_bytes(info_.format));
     Voxel v;
@@ -61,7 +61,7 @@ class VoidBoxTest : public testing::TestWithParam<const char*> {
   std::shared_ptr<const svmm::Volume> volume_;
   std::vector<std::byte> voxels_;
   VolumeInfo info_;
-  ColourOf colour_of_{VoxelFormat::rgba32, {}};
+  ColorOf color_of_{VoxelFormat::rgba32, {}};
 };
 
 TEST_P(VoidBoxTest, AskingAllVoxelsIsLookingAtEach) {

@@ -43,7 +43,7 @@ inline double distance_between(const Voxel& a, const Voxel& b, VoxelFormat f, co
     sum += d * d;
   }
   if (std::isnan(sum)) return INFINITY;
-  const double spread = params.layout == Layout::thesis && !is_colour(f) ? 2 : 1;
+  const double spread = params.layout == Layout::thesis && !is_color(f) ? 2 : 1;
   const double distance = std::sqrt(sum) * spread;
   // -0 and +0, or two NaN: apart, if nothing may be lost.
   return distance == 0 ? 1e-300 : distance;
@@ -58,7 +58,7 @@ inline Voxel average(const Cell& cell, VoxelFormat f, const Params& params) {
   bool equal = true;
   for (const Voxel& v : originals) equal &= v == originals[0];
   Voxel out;
-  if (is_colour(f)) {
+  if (is_color(f)) {
     int64_t sum[3] = {}, weights = 0, alpha = 0;
     for (const Voxel& v : originals) {
       const int a = f == VoxelFormat::rgba32 ? std::to_integer<int>(v.bytes[3]) : 255;
@@ -110,7 +110,7 @@ inline bool box_within(const std::vector<Voxel>& originals, const Voxel& value, 
     }
     sum += far * far;
   }
-  const double spread = params.layout == Layout::thesis && !is_colour(f) ? 2 : 1;
+  const double spread = params.layout == Layout::thesis && !is_color(f) ? 2 : 1;
   if (equal && f == VoxelFormat::float32) return true;
   if (sum == 0 && !equal) return params.delta > 0;
   return std::sqrt(sum) * spread <= params.delta * params.full_scale;

@@ -26,7 +26,7 @@ TEST(Svmm, EqualsReference) {
            {Content::noise, Content::smooth, Content::blobs, Content::constant, Content::specials})
         for (int variant = 0; variant < 6; ++variant) {
           const Layout layout = variant == 5 ? Layout::thesis : Layout::plain;
-          if (layout == Layout::thesis && !is_colour(f) && f != VoxelFormat::density8) continue;
+          if (layout == Layout::thesis && !is_color(f) && f != VoxelFormat::density8) continue;
           const VolumeInfo info = make_info(dims, f);
           const auto voxels = make_voxels(info, content, ++seed);
           const std::vector<int> widths = variant % 3 == 0   ? std::vector<int>{}

@@ -426,7 +426,7 @@ TEST(Vq, WhatIsRefused) {
   const VolumeInfo u8 = integer_info({4, 4, 4}, 8);
   EXPECT_EQ(code({}, u8), std::nullopt);
   for (const VoxelFormat format : {VoxelFormat::rgba32, VoxelFormat::rgb24})
-    EXPECT_EQ(code({}, voxkit::test::colour_info({4, 4, 4}, format)), ErrorCode::input);
+    EXPECT_EQ(code({}, voxkit::test::color_info({4, 4, 4}, format)), ErrorCode::input);
   EXPECT_EQ(code(make_options(Codebook::packed, Mapping::direct), u8), ErrorCode::usage);
   for (const double error : {-1.0, -0.5, std::nan(""), HUGE_VAL}) {
     Options options;

@@ -48,7 +48,7 @@ Seen look(const Volume& volume, const double (&origin)[3], const double (&direct
       .edge = 1,
       .cone = 0,
       .skip = false,
-      .colour_of = render::ColourOf(VoxelFormat::density8, {0, 255}),
+      .color_of = render::ColorOf(VoxelFormat::density8, {0, 255}),
   };
   const render::DenseView view{volume.voxels.data(), dims[0], dims[1], 1};
   auto cursor = view.cursor();

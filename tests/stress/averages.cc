@@ -37,7 +37,7 @@ Reference reference_of(const Voxel& v, Wide n) {
   if constexpr (F == VoxelFormat::float32) {
     const float x = v.as<float>();
     if (std::isfinite(x)) r.real = Exact(x) * static_cast<Exact>(n), r.finite = static_cast<Exact>(n);
-  } else if constexpr (is_colour(F)) {
+  } else if constexpr (is_color(F)) {
     for (size_t k = 0; k < 4; ++k) r.sum[k] = n * std::to_integer<uint32_t>(v.bytes[k]);
     for (size_t k = 0; k < 3; ++k) r.weighted[k] = r.sum[k] * std::to_integer<uint32_t>(v.bytes[3]);
   } else {
@@ -62,7 +62,7 @@ template <VoxelFormat F>
 double error_of(const Moments<F>& m, const Reference& r, const Criterion& criterion, double greatest) {
   if (m.count != static_cast<uint64_t>(r.count)) return 1e9;
   const Voxel is = m.value(criterion);
-  if (is_colour(F) && m.uniform()) {  // of equal voxels, that voxel: its colour, too, where alpha is 0
+  if (is_color(F) && m.uniform()) {  // of equal voxels, that voxel: its colour, too, where alpha is 0
     for (size_t k = 0; k < static_cast<size_t>(attributes(F)); ++k)
       if (rounded(r.sum[k], r.count) != std::to_integer<uint32_t>(is.bytes[k])) return 1e9;
     return 0;
@@ -78,7 +78,7 @@ double error_of(const Moments<F>& m, const Reference& r, const Criterion& criter
         2;
     const Exact beyond = magnitude(Exact(value) - mean) - half_ulp;
     return greatest == 0 ? 0 : std::max(0.0, to_double(beyond / (Exact(greatest) * Exact(0x1p-53))));
-  } else if constexpr (is_colour(F)) {
+  } else if constexpr (is_color(F)) {
     double worst = 0;
     const auto look = [&](size_t k, Wide expected) {
       worst = std::max(worst, std::abs(static_cast<double>(std::to_integer<int>(is.bytes[k])) -
@@ -100,7 +100,7 @@ void average(int levels, const Effort& effort, Report& report) {
   const Range value = F == VoxelFormat::float32     ? finite_floats
                       : F == VoxelFormat::density16 ? Range{0, 65535}
                       : F == VoxelFormat::bitmap    ? Range{0, 1}
-                      : is_colour(F)                ? Range{0, 0xffffffff}
+                      : is_color(F)                 ? Range{0, 0xffffffff}
                                                     : Range{0, 255};
   std::vector<Range> ranges = {value};
   for (int i = 0; i < levels; ++i) ranges.insert(ranges.end(), {value, {0, 255}});

@@ -209,13 +209,13 @@ std::vector<Range> svmm_ranges(VoxelFormat f) {
 }
 SvmmCase svmm_case(const Point& at, VoxelFormat f, svmm::Bound bound) {
   SvmmCase c;
-  c.info = is_colour(f) ? test::colour_info(extent, f)
-                        : test::scalar_info(extent, f == VoxelFormat::density8    ? SampleType::u8
-                                                    : f == VoxelFormat::density16 ? SampleType::i16
-                                                    : f == VoxelFormat::bitmap    ? SampleType::bit
-                                                                                  : SampleType::f32);
+  c.info = is_color(f) ? test::color_info(extent, f)
+                       : test::scalar_info(extent, f == VoxelFormat::density8    ? SampleType::u8
+                                                   : f == VoxelFormat::density16 ? SampleType::i16
+                                                   : f == VoxelFormat::bitmap    ? SampleType::bit
+                                                                                 : SampleType::f32);
   double lo = std::numeric_limits<double>::infinity(), hi = -lo;
-  const int samples = attributes(f), bytes = is_colour(f) ? 1 : voxel_bytes(f);
+  const int samples = attributes(f), bytes = is_color(f) ? 1 : voxel_bytes(f);
   for (int64_t i = 0; i < 2 * voxels * samples; ++i) {
     const int64_t row = i / samples / (2 * edge), x = i / samples % edge;
     const int64_t number = at[static_cast<size_t>(2 + (row * edge + x) * samples + i % samples)];

@@ -198,7 +198,7 @@ bool same(const std::vector<Pixel>& a, const std::vector<Pixel>& b) {
 }
 bool all_numbers(const std::vector<Pixel>& pixels) {
   return std::all_of(pixels.begin(), pixels.end(), [](const Pixel& p) {
-    return std::all_of(p.colour, p.colour + 4, [](float c) { return c >= 0 && c <= 1.0001f; });
+    return std::all_of(p.color, p.color + 4, [](float c) { return c >= 0 && c <= 1.0001f; });
   });
 }
 DvrOptions small(int64_t kind) {
@@ -271,7 +271,7 @@ void odd_voxels(const Effort& effort, Report& report) {
     others += unequal;
     no_numbers += odd;
     int64_t seen = 0;
-    for (const Pixel& pixel : a) seen += pixel.colour[3] > 0;
+    for (const Pixel& pixel : a) seen += pixel.color[3] > 0;
     return 1e6 * (unequal + odd) + static_cast<double>(seen);
   });
   std::string input;

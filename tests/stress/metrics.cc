@@ -268,7 +268,7 @@ void sums(SampleType type, const char* name, double promised, const Effort& effo
 }
 
 /// The same for colours: errors per channel and of the vector, alpha apart.
-void colour_sums(const Effort& effort, Report& report) {
+void color_sums(const Effort& effort, Report& report) {
   const Range color{0, 0xffffffff};
   const std::vector<Range> ranges = {{1, 4},  {1, 4}, {1, 4}, {0, 40}, {0, 40},
                                      {0, 40}, color,  color,  color,   color};
@@ -276,7 +276,7 @@ void colour_sums(const Effort& effort, Report& report) {
                                      {4, 4, 4, 1, 1, 1, 0, 0, 1, 0}};
   Context ctx = stress_context();
   const Worst found = climb(ranges, starts, effort.share(200), effort.seed, [&](const Point& at) {
-    const VolumeInfo info = test::colour_info({at[0] << 10, at[1] << 10, at[2] << 10}, VoxelFormat::rgba32);
+    const VolumeInfo info = test::color_info({at[0] << 10, at[1] << 10, at[2] << 10}, VoxelFormat::rgba32);
     const Box box{{500, 600, 700}, {500 + at[3], 600 + at[4], 700 + at[5]}};
     const auto voxel = [&](size_t i) { return Voxel::of(static_cast<uint32_t>(at[i])); };
     TwoValues a(info, box, voxel(6), voxel(7)), b(info, box, voxel(8), voxel(9));
@@ -344,7 +344,7 @@ void fill(const Effort& effort, Report& report) {
   sums(SampleType::u8, "u8", 1e-15, effort, report);
   sums(SampleType::u16, "u16", 1e-15, effort, report);
   sums(SampleType::f32, "floats", 1e-11, effort, report);
-  colour_sums(effort, report);
+  color_sums(effort, report);
   float_rows(effort, report);
 }
 

@@ -175,14 +175,14 @@ Result<Input> open_input(const std::string& name, const OpenOptions& options, Co
   VOX_TRY(Input input, open_as_it_is(name, options, ctx));
   if (input.source) VOX_CHECK(check_not_written(input.source->info(), options));
   if (options.labels && input.source) {
-    if (is_colour(input.source->info().format))
+    if (is_color(input.source->info().format))
       return bad_usage(fmt::format("--labels: voxels are {}: expected scalars",
                                    voxkit::name(input.source->info().format)));
     input.source->set_labels();
   }
   if (is_compressed(name) || !input.source) return input;
   const VolumeInfo& info = input.source->info();
-  if (options.fill && is_colour(info.format))
+  if (options.fill && is_color(info.format))
     return bad_usage(fmt::format("--fill: voxels are {}: expected scalars", voxkit::name(info.format)));
   const auto fill =
       options.fill

@@ -4,7 +4,7 @@
 #include <limits>
 #include <random>
 
-#include "libmetrics/colour_distance.h"
+#include "libmetrics/color_distance.h"
 #include "tests/libmetrics/pictures.h"
 
 namespace voxkit {
@@ -16,7 +16,7 @@ Lab lab_of_srgb(double r, double g, double b) {
   return lab_of_linear(srgb_to_linear(r), srgb_to_linear(g), srgb_to_linear(b));
 }
 
-TEST(ColourTest, TransferFunction) {
+TEST(ColorTest, TransferFunction) {
   EXPECT_EQ(srgb_to_linear(0), 0);
   EXPECT_EQ(srgb_to_linear(1), 1);
   EXPECT_NEAR(srgb_to_linear(0.5), 0.21404114, 1e-8);
@@ -24,17 +24,17 @@ TEST(ColourTest, TransferFunction) {
   EXPECT_NEAR(srgb_to_linear(0.04045), srgb_to_linear(0.0404500001), 1e-7);
 }
 
-TEST(ColourTest, PrimariesInLab) {
+TEST(ColorTest, PrimariesInLab) {
   struct {
     double r, g, b, l, a, b_star;
-  } const colours[] = {{0, 0, 0, 0, 0, 0},
-                       {1, 1, 1, 100, 0, 0},
-                       {1, 0, 0, 53.24, 80.09, 67.20},
-                       {0, 1, 0, 87.73, -86.18, 83.18},
-                       {0, 0, 1, 32.30, 79.19, -107.86},
-                       {1, 1, 0, 97.14, -21.55, 94.48},
-                       {0.5, 0.5, 0.5, 53.39, 0, 0}};
-  for (const auto& c : colours) {
+  } const colors[] = {{0, 0, 0, 0, 0, 0},
+                      {1, 1, 1, 100, 0, 0},
+                      {1, 0, 0, 53.24, 80.09, 67.20},
+                      {0, 1, 0, 87.73, -86.18, 83.18},
+                      {0, 0, 1, 32.30, 79.19, -107.86},
+                      {1, 1, 0, 97.14, -21.55, 94.48},
+                      {0.5, 0.5, 0.5, 53.39, 0, 0}};
+  for (const auto& c : colors) {
     const Lab lab = lab_of_srgb(c.r, c.g, c.b);
     EXPECT_NEAR(lab.l, c.l, 0.03);
     EXPECT_NEAR(lab.a, c.a, 0.03);

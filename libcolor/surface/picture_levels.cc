@@ -1,4 +1,4 @@
-#include "libcolor/surface/texture_levels.h"
+#include "libcolor/surface/picture_levels.h"
 
 #include <algorithm>
 #include <cmath>
@@ -25,15 +25,15 @@ Float4 load(const uint16_t* texel) {
 }
 
 /// The part of 0..1 that a coordinate falls on.
-float wrapped(double t, TextureWrap wrap) {
+float wrapped(double t, PictureWrap wrap) {
   switch (wrap) {
-    case TextureWrap::clamp:
+    case PictureWrap::clamp:
       return static_cast<float>(std::clamp(t, 0.0, 1.0));
-    case TextureWrap::mirror: {
+    case PictureWrap::mirror: {
       const double half = t / 2, part = 2 * (half - std::floor(half));  // 0..2
       return static_cast<float>(part > 1 ? 2 - part : part);
     }
-    case TextureWrap::repeat:
+    case PictureWrap::repeat:
       break;
   }
   return static_cast<float>(t - std::floor(t));
@@ -44,15 +44,15 @@ struct Pair {
   int32_t first, second;
   float weight;
 };
-Pair pair_at(float t, int32_t size, TextureWrap wrap) {
+Pair pair_at(float t, int32_t size, PictureWrap wrap) {
   const float place = t * static_cast<float>(size) - 0.5f;  // above -1
   const auto first = static_cast<int32_t>(place + 1) - 1;
   Pair pair{first, first + 1, place - static_cast<float>(first)};
   if (static_cast<uint32_t>(first) < static_cast<uint32_t>(size - 1)) [[likely]]
     return pair;
   // At the first or the last texel; a coordinate may round to the far end.
-  pair.first = first < 0 ? wrap == TextureWrap::repeat ? size - 1 : 0 : size - 1;
-  pair.second = first < 0 || wrap == TextureWrap::repeat ? 0 : size - 1;
+  pair.first = first < 0 ? wrap == PictureWrap::repeat ? size - 1 : 0 : size - 1;
+  pair.second = first < 0 || wrap == PictureWrap::repeat ? 0 : size - 1;
   return pair;
 }
 
@@ -74,7 +74,7 @@ Cover cover(int64_t at, int64_t from, int64_t to) {
 
 }  // namespace
 
-Result<TextureLevels::Level> TextureLevels::Level::make(int64_t width, int64_t height, Context& ctx) {
+Result<PictureLevels::Level> PictureLevels::Level::make(int64_t width, int64_t height, Context& ctx) {
   Level level;
   level.width = static_cast<int32_t>(width);
   level.height = static_cast<int32_t>(height);
@@ -83,7 +83,7 @@ Result<TextureLevels::Level> TextureLevels::Level::make(int64_t width, int64_t h
   return level;
 }
 
-Result<TextureLevels::Level> TextureLevels::halved(const Level& from, Context& ctx) {
+Result<PictureLevels::Level> PictureLevels::halved(const Level& from, Context& ctx) {
   VOX_TRY(Level to, Level::make(std::max(1, from.width / 2), std::max(1, from.height / 2), ctx));
   const uint64_t area = static_cast<uint64_t>(from.width) * static_cast<uint64_t>(from.height);
   VOX_CHECK(parallel_for(ctx, to.height, [&](int64_t y) -> Status {
@@ -106,13 +106,13 @@ Result<TextureLevels::Level> TextureLevels::halved(const Level& from, Context& c
   return to;
 }
 
-Result<TextureLevels> TextureLevels::make(const Texture& texture, bool opaque, Context& ctx) {
-  TextureLevels out;
-  VOX_TRY(Level first, Level::make(texture.width, texture.height, ctx));
+Result<PictureLevels> PictureLevels::make(const Picture& picture, bool opaque, Context& ctx) {
+  PictureLevels out;
+  VOX_TRY(Level first, Level::make(picture.width, picture.height, ctx));
   const auto& linear = light_tables().linear;
-  const uint8_t* from = texture.data();
-  for (int64_t y = 0; y < texture.height; ++y)
-    for (int64_t x = 0; x < texture.width; ++x, from += 4) {
+  const uint8_t* from = picture.data();
+  for (int64_t y = 0; y < picture.height; ++y)
+    for (int64_t x = 0; x < picture.width; ++x, from += 4) {
       uint16_t* to = first.at(x, y);
       const uint32_t alpha = opaque ? 255 : from[3];
       for (size_t c = 0; c < 3; ++c) to[c] = static_cast<uint16_t>((linear[from[c]] * alpha + 127) / 255);
@@ -126,7 +126,7 @@ Result<TextureLevels> TextureLevels::make(const Texture& texture, bool opaque, C
   return out;
 }
 
-TextureLevels::Detail TextureLevels::detail(double texels_squared) const {
+PictureLevels::Detail PictureLevels::detail(double texels_squared) const {
   const auto last = static_cast<uint32_t>(levels_.size() - 1);
   if (!(texels_squared > 1)) return {0, 0};
   int exponent = 0;
@@ -138,7 +138,7 @@ TextureLevels::Detail TextureLevels::detail(double texels_squared) const {
   return {whole, static_cast<float>(level - whole)};
 }
 
-Float4 TextureLevels::bilinear(const Level& level, float u, float v, TextureWrap wrap_u, TextureWrap wrap_v) {
+Float4 PictureLevels::bilinear(const Level& level, float u, float v, PictureWrap wrap_u, PictureWrap wrap_v) {
   const Pair x = pair_at(u, level.width, wrap_u), y = pair_at(v, level.height, wrap_v);
   const Float4 a = load(level.at(x.first, y.first)), b = load(level.at(x.second, y.first));
   const Float4 c = load(level.at(x.first, y.second)), d = load(level.at(x.second, y.second));
@@ -146,17 +146,17 @@ Float4 TextureLevels::bilinear(const Level& level, float u, float v, TextureWrap
   return upper + (lower - upper) * y.weight;
 }
 
-Float4 TextureLevels::nearest(const Level& level, float u, float v) {
+Float4 PictureLevels::nearest(const Level& level, float u, float v) {
   const auto texel = [](float t, int32_t size) {
     return std::min(static_cast<int32_t>(t * static_cast<float>(size)), size - 1);
   };
   return load(level.at(texel(u, level.width), texel(v, level.height)));
 }
 
-Float4 TextureLevels::sample(double u, double v, TextureWrap wrap_u, TextureWrap wrap_v, TextureFilter filter,
+Float4 PictureLevels::sample(double u, double v, PictureWrap wrap_u, PictureWrap wrap_v, PictureFilter filter,
                              Detail detail) const {
   const float s = wrapped(u, wrap_u), t = wrapped(v, wrap_v);
-  const bool as_it_is = filter == TextureFilter::nearest && detail.level == 0;
+  const bool as_it_is = filter == PictureFilter::nearest && detail.level == 0;
   Float4 value = as_it_is ? nearest(levels_[0], s, t) : bilinear(levels_[detail.level], s, t, wrap_u, wrap_v);
   if (detail.next > 0)
     value += (bilinear(levels_[detail.level + 1], s, t, wrap_u, wrap_v) - value) * detail.next;

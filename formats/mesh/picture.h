@@ -11,8 +11,8 @@
 namespace voxkit {
 
 /// Texels of 4 bytes: red, green and blue in sRGB and alpha, not multiplied by it; rows from top to bottom.
-/// The memory counts against ctx.memory, which must outlive the texture.
-struct Texture {
+/// The memory counts against ctx.memory, which must outlive the picture.
+struct Picture {
   int64_t width = 0, height = 0;
   std::unique_ptr<Buffer> texels;
   bool has_alpha = false;  ///< whether some alpha is below 255
@@ -22,33 +22,33 @@ struct Texture {
 };
 
 /// Most texels a side, and in all: larger pictures are refused before they are decoded.
-inline constexpr int64_t max_texture_side = 1 << 16;
-inline constexpr int64_t max_texture_texels = int64_t{1} << 28;
+inline constexpr int64_t max_picture_side = 1 << 16;
+inline constexpr int64_t max_picture_texels = int64_t{1} << 28;
 
 /// An opaque or transparent picture in one colour; `fill` is R, G, B, A in its lowest to highest byte.
-Result<Texture> plain_texture(int64_t width, int64_t height, uint32_t fill, Context& ctx);
+Result<Picture> plain_picture(int64_t width, int64_t height, uint32_t fill, Context& ctx);
 
 /// ErrorCode::input for pictures above these, or without texels.
-Status check_texture_size(const std::string& name, uint64_t width, uint64_t height);
+Status check_picture_size(const std::string& name, uint64_t width, uint64_t height);
 
 /// Reads a file of any format that `read_image` knows, and .tga, .bmp and .webp. Samples of 16 bits are
 /// rounded to 8, floats are taken as linear light. Errors: ErrorCode::input, ErrorCode::limit.
-Result<Texture> read_texture(const std::string& path, Context& ctx);
+Result<Picture> read_picture(const std::string& path, Context& ctx);
 
 /// The same of the bytes of a PNG, JPEG or WebP file. `name` is for errors.
-Result<Texture> decode_texture(const std::string& name, std::span<const std::byte> bytes, Context& ctx);
+Result<Picture> decode_picture(const std::string& name, std::span<const std::byte> bytes, Context& ctx);
 
 /// Stored colours v become base + gain * v, 0..1.
-void adjust_colors(Texture& texture, float base, float gain);
+void adjust_colors(Picture& picture, float base, float gain);
 
-/// Puts the opacity that `mask` shows in place of the alpha of `texture`: its channel r, g, b, m (alpha) or l
+/// Puts the opacity that `mask` shows in place of the alpha of `picture`: its channel r, g, b, m (alpha) or l
 /// (brightness); 0: its alpha where it has one and else its brightness. A mask of another size is stretched
 /// over it: the nearest texel counts.
-void set_opacity(Texture& texture, const Texture& mask, char channel = 0);
+void set_opacity(Picture& picture, const Picture& mask, char channel = 0);
 
 /// Finds the file that a mesh in `folder` calls `name`: as it is written, with '/' for '\', and with its
 /// %-escapes resolved; then in letters of either case; then by its last part, beside the mesh. Empty where
 /// there is none.
-std::string find_texture(const std::string& folder, const std::string& name);
+std::string find_picture(const std::string& folder, const std::string& name);
 
 }  // namespace voxkit

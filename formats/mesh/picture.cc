@@ -1,4 +1,4 @@
-#include "formats/mesh/texture.h"
+#include "formats/mesh/picture.h"
 
 #include <fmt/format.h>
 #include <unistd.h>
@@ -158,7 +158,7 @@ std::array<uint64_t, 2> sides_of(const std::string& name, std::span<const std::b
   return unknown;
 }
 
-Result<Texture> decode_webp(const std::string& name, std::span<const std::byte> bytes, Context& ctx) {
+Result<Picture> decode_webp(const std::string& name, std::span<const std::byte> bytes, Context& ctx) {
   VOX_TRY(const ModuleTable* const module,
           load_module({"webp", "reading WebP textures", "libwebp-dev"}, name));
   return module->mesh->decode_webp(name, bytes, ctx);
@@ -166,62 +166,62 @@ Result<Texture> decode_webp(const std::string& name, std::span<const std::byte> 
 
 }  // namespace
 
-Status check_texture_size(const std::string& name, uint64_t width, uint64_t height) {
-  constexpr auto side = static_cast<uint64_t>(max_texture_side);
+Status check_picture_size(const std::string& name, uint64_t width, uint64_t height) {
+  constexpr auto side = static_cast<uint64_t>(max_picture_side);
   if (width < 1 || height < 1 || width > side || height > side ||
-      width * height > uint64_t{max_texture_texels})
+      width * height > uint64_t{max_picture_texels})
     return bad_input(name, fmt::format("a texture of {} x {} texels: expected 1 to {} a side and {} in all",
-                                       width, height, max_texture_side, max_texture_texels));
+                                       width, height, max_picture_side, max_picture_texels));
   return {};
 }
 
-Result<Texture> plain_texture(int64_t width, int64_t height, uint32_t fill, Context& ctx) {
-  Texture texture;
-  texture.width = width;
-  texture.height = height;
-  texture.has_alpha = (fill >> 24) != 255;
-  VOX_TRY(texture.texels, Buffer::allocate(static_cast<uint64_t>(width * height) * 4, "a texture", ctx));
-  for (int64_t i = 0; i < width * height; ++i) std::memcpy(texture.data() + 4 * i, &fill, 4);
-  return texture;
+Result<Picture> plain_picture(int64_t width, int64_t height, uint32_t fill, Context& ctx) {
+  Picture picture;
+  picture.width = width;
+  picture.height = height;
+  picture.has_alpha = (fill >> 24) != 255;
+  VOX_TRY(picture.texels, Buffer::allocate(static_cast<uint64_t>(width * height) * 4, "a texture", ctx));
+  for (int64_t i = 0; i < width * height; ++i) std::memcpy(picture.data() + 4 * i, &fill, 4);
+  return picture;
 }
 
-Result<Texture> read_texture(const std::string& path, Context& ctx) {
+Result<Picture> read_picture(const std::string& path, Context& ctx) {
   {
     VOX_TRY(const auto file, MappedFile::open(path));
     if (is_webp(file->bytes())) return decode_webp(path, file->bytes(), ctx);
     const auto [width, height] = sides_of(path, file->bytes());
-    VOX_CHECK(check_texture_size(path, width, height));
+    VOX_CHECK(check_picture_size(path, width, height));
   }
   VOX_TRY(const auto read, read_image(path, ctx));
   if (!read) return bad_input(path, "a texture of several pages: expected one picture");
   const Image& image = *read;
   VOX_CHECK(
-      check_texture_size(path, static_cast<uint64_t>(image.width()), static_cast<uint64_t>(image.height())));
+      check_picture_size(path, static_cast<uint64_t>(image.width()), static_cast<uint64_t>(image.height())));
   if (image.type() == SampleType::i8 || image.type() == SampleType::i16)
     return bad_input(path, "a texture of signed samples: expected unsigned ones, or floats");
-  Texture texture;
-  texture.width = image.width();
-  texture.height = image.height();
-  VOX_TRY(texture.texels, Buffer::allocate(static_cast<uint64_t>(image.pixels()) * 4, "a texture", ctx));
-  const int channels = image.channels(), colours = image.colours();
+  Picture picture;
+  picture.width = image.width();
+  picture.height = image.height();
+  VOX_TRY(picture.texels, Buffer::allocate(static_cast<uint64_t>(image.pixels()) * 4, "a texture", ctx));
+  const int channels = image.channels(), colors = image.colors();
   const bool linear = image.type() == SampleType::f32;
   const auto scale = static_cast<float>(255 / image.peak());
   for (int64_t y = 0; y < image.height(); ++y) {
     const float* in = image.row(y);
-    uint8_t* out = texture.data() + 4 * y * image.width();
+    uint8_t* out = picture.data() + 4 * y * image.width();
     for (int64_t x = 0; x < image.width(); ++x, in += channels, out += 4) {
       for (int c = 0; c < 3; ++c) {
-        const float sample = in[colours == 3 ? c : 0];
+        const float sample = in[colors == 3 ? c : 0];
         out[c] = byte_of(linear ? encoded(sample) : sample * scale);
       }
-      out[3] = channels > colours ? byte_of(in[colours] * scale) : 255;
-      texture.has_alpha |= out[3] != 255;
+      out[3] = channels > colors ? byte_of(in[colors] * scale) : 255;
+      picture.has_alpha |= out[3] != 255;
     }
   }
-  return texture;
+  return picture;
 }
 
-Result<Texture> decode_texture(const std::string& name, std::span<const std::byte> bytes, Context& ctx) {
+Result<Picture> decode_picture(const std::string& name, std::span<const std::byte> bytes, Context& ctx) {
   if (is_webp(bytes)) return decode_webp(name, bytes, ctx);
   if (starts_with(bytes, "\xabKTX 20"))
     return bad_input(name, "an embedded texture of KTX2, Basis Universal: expected PNG, JPEG or WebP");
@@ -230,41 +230,41 @@ Result<Texture> decode_texture(const std::string& name, std::span<const std::byt
                                                             : nullptr;
   if (!ending) return bad_input(name, "an embedded texture of unknown format: expected PNG or JPEG, or WebP");
   VOX_TRY(const PictureFile file, PictureFile::write(name, bytes, ending));
-  auto texture = read_texture(file.path(), ctx);
-  if (!texture) return fail(texture.error().code, name, "an embedded texture: " + texture.error().what);
-  return texture;
+  auto picture = read_picture(file.path(), ctx);
+  if (!picture) return fail(picture.error().code, name, "an embedded texture: " + picture.error().what);
+  return picture;
 }
 
-void adjust_colors(Texture& texture, float base, float gain) {
+void adjust_colors(Picture& picture, float base, float gain) {
   std::array<uint8_t, 256> table;
   for (size_t i = 0; i < 256; ++i) table[i] = byte_of(255 * base + gain * static_cast<float>(i));
-  for (int64_t i = 0; i < texture.width * texture.height; ++i)
+  for (int64_t i = 0; i < picture.width * picture.height; ++i)
     for (int64_t c = 0; c < 3; ++c) {
-      uint8_t& value = texture.data()[4 * i + c];
+      uint8_t& value = picture.data()[4 * i + c];
       value = table[value];
     }
 }
 
-void set_opacity(Texture& texture, const Texture& mask, char channel) {
-  texture.has_alpha = false;
+void set_opacity(Picture& picture, const Picture& mask, char channel) {
+  picture.has_alpha = false;
   const char* const colors = "rgb";
   const char* const color = channel ? std::strchr(colors, channel) : nullptr;
   const bool by_alpha = channel == 'm' || (channel == 0 && mask.has_alpha);
-  for (int64_t y = 0; y < texture.height; ++y)
-    for (int64_t x = 0; x < texture.width; ++x) {
-      const int64_t from_x = (2 * x + 1) * mask.width / (2 * texture.width),
-                    from_y = (2 * y + 1) * mask.height / (2 * texture.height);
+  for (int64_t y = 0; y < picture.height; ++y)
+    for (int64_t x = 0; x < picture.width; ++x) {
+      const int64_t from_x = (2 * x + 1) * mask.width / (2 * picture.width),
+                    from_y = (2 * y + 1) * mask.height / (2 * picture.height);
       const uint8_t* in = mask.data() + 4 * (from_y * mask.width + from_x);
-      uint8_t& alpha = texture.data()[4 * (y * texture.width + x) + 3];
+      uint8_t& alpha = picture.data()[4 * (y * picture.width + x) + 3];
       // Weights of ITU-R BT.601 for the brightness of stored values, in 256ths.
       alpha = by_alpha ? in[3]
               : color  ? in[color - colors]
                        : static_cast<uint8_t>((77 * in[0] + 150 * in[1] + 29 * in[2] + 128) >> 8);
-      texture.has_alpha |= alpha != 255;
+      picture.has_alpha |= alpha != 255;
     }
 }
 
-std::string find_texture(const std::string& folder, const std::string& name) {
+std::string find_picture(const std::string& folder, const std::string& name) {
   std::string slashes = name;
   std::replace(slashes.begin(), slashes.end(), '\\', '/');
   const fs::path base(folder);

@@ -1,4 +1,4 @@
-#include "libmetrics/colour_distance.h"
+#include "libmetrics/color_distance.h"
 
 #include <algorithm>
 #include <cmath>
@@ -21,10 +21,10 @@ Result<LabDiff> diff_lab(const Image& a, const Image& b, Context& ctx) {
   const auto light = [&](float sample) {
     return linear.empty() ? static_cast<double>(sample) : linear[static_cast<size_t>(sample)];
   };
-  const auto lab = [&](const float* pixel, int colours) {
+  const auto lab = [&](const float* pixel, int colors) {
     const double first = light(pixel[0]);
-    return colours == 3 ? lab_of_linear(first, light(pixel[1]), light(pixel[2]))
-                        : lab_of_linear(first, first, first);
+    return colors == 3 ? lab_of_linear(first, light(pixel[1]), light(pixel[2]))
+                       : lab_of_linear(first, first, first);
   };
 
   constexpr int64_t pixels_at_once = 1 << 14;
@@ -41,8 +41,8 @@ Result<LabDiff> diff_lab(const Image& a, const Image& b, Context& ctx) {
     const int64_t begin = block * pixels_at_once, end = std::min(begin + pixels_at_once, a.pixels());
     Part part;
     for (int64_t i = begin; i < end; ++i) {
-      const double e = delta_e(lab(a.row(0) + i * a.channels(), a.colours()),
-                               lab(b.row(0) + i * b.channels(), b.colours()));
+      const double e =
+          delta_e(lab(a.row(0) + i * a.channels(), a.colors()), lab(b.row(0) + i * b.channels(), b.colors()));
       add(part, e, e);
     }
     parts[static_cast<size_t>(block)] = part;

@@ -1,4 +1,4 @@
-// A texture at all its sizes, in linear light, and its mean over a footprint.
+// A picture at all its sizes, in linear light, and its mean over a footprint.
 #pragma once
 
 #include <cstdint>
@@ -15,10 +15,10 @@ using Float4 = float __attribute__((vector_size(16)));
 
 /// Each level has half the sides of the one before, rounded down, to 1 x 1: the means over the areas that its
 /// texels cover. Colours are multiplied by alpha, so that what is not there gives no colour to what is.
-class TextureLevels {
+class PictureLevels {
  public:
   /// `opaque`: alpha counts as 1 everywhere. The memory counts against ctx.memory.
-  static Result<TextureLevels> make(const Texture& texture, bool opaque, Context& ctx);
+  static Result<PictureLevels> make(const Picture& picture, bool opaque, Context& ctx);
 
   int64_t width() const { return levels_[0].width; }
   int64_t height() const { return levels_[0].height; }
@@ -32,8 +32,8 @@ class TextureLevels {
   Detail detail(double texels_squared) const;
 
   /// The mean around (u, v), linear between texels and levels: colours times alpha, and alpha, in 0..65535.
-  /// With TextureFilter::nearest the texels of the first level are as they are. Any finite u and v.
-  Float4 sample(double u, double v, TextureWrap wrap_u, TextureWrap wrap_v, TextureFilter filter,
+  /// With PictureFilter::nearest the texels of the first level are as they are. Any finite u and v.
+  Float4 sample(double u, double v, PictureWrap wrap_u, PictureWrap wrap_v, PictureFilter filter,
                 Detail detail) const;
 
  private:
@@ -47,7 +47,7 @@ class TextureLevels {
     }
   };
   static Result<Level> halved(const Level& from, Context& ctx);
-  static Float4 bilinear(const Level& level, float u, float v, TextureWrap wrap_u, TextureWrap wrap_v);
+  static Float4 bilinear(const Level& level, float u, float v, PictureWrap wrap_u, PictureWrap wrap_v);
   static Float4 nearest(const Level& level, float u, float v);
   std::vector<Level> levels_;
 };
