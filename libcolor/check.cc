@@ -7,7 +7,7 @@
 
 #include "formats/parallel.h"
 #include "formats/reservation.h"
-#include "libcolor/palette/palette_check.h"
+#include "libcolor/part_codecs.h"
 #include "libcolor/store.h"
 #include "libcolor/surface/morton.h"
 
@@ -32,14 +32,7 @@ class Checker {
     }));
     VOX_CHECK(check_dag());
     const auto parts = static_cast<int64_t>(part_count(params_.color_count));
-    if (params_.codec == ColorCodec::raw) return {};
-    return parallel_for(ctx_, parts, [&](int64_t i) {
-      const auto part = static_cast<uint64_t>(i);
-      return makes_images(params_.codec)            ? check_image(part)
-             : makes_textures(params_.codec)        ? check_textures(part)
-             : params_.codec == ColorCodec::palette ? check_palettes(part)
-                                                    : check_part(part);
-    });
+    return parallel_for(ctx_, parts, [&](int64_t i) { return check_part(static_cast<uint64_t>(i)); });
   }
 
  private:
@@ -160,65 +153,17 @@ class Checker {
     return {};
   }
 
-  Status check_textures(uint64_t part) const {
-    const std::byte* const bytes = volume_.store().part(part, volume_.container());
-    if (bytes == nullptr) return volume_.store().status();
-    TextureReader reader;
-    reader.open(bytes, params_, colors_of_part(params_.color_count, part));
-    const uint32_t invalid = reader.first_invalid();
-    if (invalid == reader.blocks()) return {};
-    return bad(fmt::format("chunk COLR 0.{}: block {}: not a valid one", part, invalid));
-  }
-
-  Status check_palettes(uint64_t part) const {
-    const std::byte* const bytes = volume_.store().part(part, volume_.container());
-    if (bytes == nullptr) return volume_.store().status();
-    const std::string wrong = check_palette_part(
-        PaletteView(bytes, volume_.store().part_bytes(part), colors_of_part(params_.color_count, part),
-                    palette_bits(params_.palette_colors)),
-        params_.palette_colors);
-    if (wrong.empty()) return {};
-    return bad(fmt::format("chunk COLR 0.{}: {}", part, wrong));
-  }
-
-  Status check_image(uint64_t part) const {
-    return volume_.store().decoded(part) ? Status() : volume_.store().status();
-  }
-
+  /// Of codecs whose parts are decoded as a whole, that is the check.
   Status check_part(uint64_t part) const {
-    const std::byte* const bytes = volume_.store().part(part, volume_.container());
-    if (bytes == nullptr) return volume_.store().status();
-    const uint32_t colors = colors_of_part(params_.color_count, part);
-    const PartView view(bytes, volume_.store().part_bytes(part), colors, params_.endpoints);
-    const auto broken = [&](const std::string& what) {
-      return bad(fmt::format("chunk COLR 0.{}: {}", part, what));
-    };
-    if (!view.valid()) return broken("fewer bytes than its blocks take");
-    uint32_t next = 0;
-    for (uint32_t m = 0; m < view.macro_blocks(); ++m) {
-      const PartView::MacroBlock macro = view.macro_block(m);
-      const uint32_t size = std::min(macro_block_colors, colors - m * macro_block_colors);
-      const auto wrong = [&](const char* what) { return broken(fmt::format("macro block {}: {}", m, what)); };
-      if (macro.first != next || (macro.raw ? macro.last != next : macro.last <= next))
-        return wrong("not its blocks");
-      next = macro.last;
-      if (macro.raw) {
-        if (macro.weights % 8 != 0 || macro.weights + uint64_t{size} * 24 > view.weight_bits())
-          return wrong("colors behind the end");
-        continue;
-      }
-      for (uint32_t b = macro.first; b < macro.last; ++b) {
-        const PartView::Block block = view.block(b);
-        const uint32_t end = b + 1 < macro.last ? view.first_color(b + 1) : size;
-        if (b == macro.first && block.first != 0) return wrong("no block for its first color");
-        if (end <= block.first) return wrong("blocks out of order");
-        if (macro.weights + (block.bits == 0 ? 0 : block.weights) + uint64_t{end - block.first} * block.bits >
-            view.weight_bits())
-          return wrong("weights behind the end");
-      }
-    }
-    if (next != view.blocks()) return broken("blocks of no macro block");
-    return {};
+    const Store& store = volume_.store();
+    if (store.decodes_parts()) return store.decoded(part) ? Status() : store.status();
+    const std::byte* const bytes = store.part(part, volume_.container());
+    if (bytes == nullptr) return store.status();
+    const PartCodec& codec = part_codec(params_.codec);
+    if (codec.check == nullptr) return {};
+    const std::string wrong =
+        codec.check({bytes, store.part_bytes(part)}, params_, colors_of_part(params_.color_count, part));
+    return wrong.empty() ? Status() : bad(fmt::format("chunk COLR 0.{}: {}", part, wrong));
   }
 
   const Volume& volume_;

@@ -13,7 +13,7 @@
 #include "libcolor/dag/dag_builder.h"
 #include "libcolor/dag/dag_recount.h"
 #include "libcolor/layout.h"
-#include "libcolor/palette/palette_encode.h"
+#include "libcolor/part_codecs.h"
 #include "libcolor/textures/astc.h"
 #include "libcolor/textures/image_codec.h"
 #include "libcolor/textures/texture.h"
@@ -88,18 +88,7 @@ class ColorWriter {
     return part;
   }
   Result<EncodedPart> encode(std::span<const Rgb> colors) const {
-    if (makes_images(options_.codec)) return encode_as_image(colors, options_);
-    if (makes_textures(options_.codec)) return encode_texture(colors, options_);
-    if (palette_ != nullptr) return encode_palette_part(colors, *palette_, options_.effort);
-    if (options_.codec != ColorCodec::raw)
-      return encode_part(colors,
-                         {options_.threshold, options_.codec == ColorCodec::fws ? options_.weight_bits : 0,
-                          options_.effort, options_.space});
-    EncodedPart part;
-    static_assert(sizeof(Rgb) == 3);
-    const auto raw = std::as_bytes(colors);
-    part.bytes.assign(raw.begin(), raw.end());
-    return part;
+    return part_codec(options_.codec).encode(colors, options_, palette_);
   }
 
   const Options& options_;
@@ -139,9 +128,7 @@ Status validate(const Options& o) {
     return bad_usage(fmt::format("a palette of {} colors: expected 1 to {}", o.palette, most_palette_colors));
   if (o.image_palette != 0 && (o.image_palette < 2 || o.image_palette > 256))
     return bad_usage(fmt::format("a palette of {} colors: expected 2 to 256, or 0", o.image_palette));
-  VOX_CHECK(texture_support(o.codec));
-  if (makes_images(o.codec))
-    VOX_CHECK(image_encoder_support(image_format(o.codec), image_coding_of(o, part_colors)));
+  VOX_CHECK(part_codec(o.codec).support(o));
   if (o.effort < 1 || o.effort > 9) return bad_usage(fmt::format("effort {}: expected 1 to 9", o.effort));
   return {};
 }

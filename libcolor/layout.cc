@@ -7,6 +7,7 @@
 
 #include "formats/little_endian.h"
 #include "libcolor/palette/palette.h"
+#include "libcolor/part_codecs.h"
 #include "libcolor/textures/astc.h"
 #include "libcolor/textures/texture.h"
 
@@ -66,7 +67,7 @@ Result<Params> unpack_params(std::span<const std::byte> bytes, const VolumeInfo&
     if (field(at) >= 1 && field(at) <= most) return {};
     return bad(at, fmt::format("unknown {} {}", what, field(at)));
   };
-  VOX_CHECK(is_one_of(0, 10, "color codec"));
+  VOX_CHECK(is_one_of(0, most_codec_number(), "color codec"));
   VOX_CHECK(is_one_of(1, 2, "choice of colors"));
   VOX_CHECK(is_one_of(2, 2, "place of counts"));
   VOX_CHECK(is_one_of(3, 2, "kind of endpoints"));

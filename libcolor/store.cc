@@ -4,6 +4,7 @@
 
 #include <algorithm>
 
+#include "libcolor/part_codecs.h"
 #include "libcolor/textures/image_codec.h"
 
 namespace voxkit::color {
@@ -80,12 +81,10 @@ Status Store::find_chunks(const Container& container, const Params& params) {
     if (parts_[part] == none) return bad(fmt::format("no chunk COLR 0.{}", part));
     const uint64_t length = table[parts_[part]].length;
     const uint32_t colors = colors_of_part(params.color_count, part);
-    if (params.codec == ColorCodec::raw || makes_textures(params.codec)) {
-      const uint64_t expected =
-          params.codec == ColorCodec::raw ? uint64_t{colors} * 3 : texture_bytes(params, colors);
-      if (length != expected)
-        return bad(fmt::format("chunk COLR 0.{} has {} bytes: expected {}", part, length, expected));
-    }
+    if (const auto part_bytes = part_codec(params.codec).part_bytes;
+        part_bytes != nullptr && length != part_bytes(params, colors))
+      return bad(
+          fmt::format("chunk COLR 0.{} has {} bytes: expected {}", part, length, part_bytes(params, colors)));
     sizes_.push_back(length);
   }
   found_ = std::make_unique<std::atomic<const std::byte*>[]>(parts);

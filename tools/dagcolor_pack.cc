@@ -5,6 +5,7 @@
 
 #include "formats/output_file.h"
 #include "libcolor/compare.h"
+#include "libcolor/part_codecs.h"
 #include "tools/common/color_report.h"
 #include "tools/common/encoding.h"
 #include "tools/common/surface_input.h"
@@ -92,7 +93,7 @@ void declare(CommandLine& line, Options& o) {
 
 color::Options encoder_options(const Options& o) {
   color::Options options = o.encoder;
-  options.codec = *codec_named(o.codec);
+  options.codec = *color::codec_named(o.codec);
   if (o.palette && options.codec == color::ColorCodec::palette) options.palette = *o.palette;
   if (o.palette && options.codec == color::ColorCodec::png)
     options.image_palette = static_cast<int>(*o.palette);
@@ -194,12 +195,11 @@ Result<int> work(const Options& o, Run& run) {
   for (const std::string& note : notes) run.say(fmt::format("{}: {}", o.input, note));
   if (run.options.json) VOX_CHECK(print(json_of(encoding, run, report, o, notes, diff).text()));
   if (!run.options.quiet && !run.options.json)
-    fmt::print(
-        stderr,
-        "{}: {} voxels in {} bytes: geometry {}, colors {} ({:.4g} %){}, error {:.4g}, in {:.2f} s{}\n",
+    tell(fmt::format(
+        "{}: {} voxels in {} bytes: geometry {}, colors {} ({:.4g} %){}, error {:.4g}, in {:.2f} s{}",
         o.output, p.leaf_voxels, encoding.file_bytes, p.dag_bytes, p.color_bytes, color_percent(p),
         emits ? ", emission added" : "", p.grmse, encoding.seconds,
-        diff ? fmt::format(", greatest error {:.4g}", diff->max_distance) : "");
+        diff ? fmt::format(", greatest error {:.4g}", diff->max_distance) : ""));
   return 0;
 }
 

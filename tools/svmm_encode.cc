@@ -40,7 +40,8 @@ void declare(CommandLine& line, Options& o) {
               });
   line.option("-r,--rootwidth", "R", "The level with no side above R is the root (32)",
               integer(o.rootwidth, 1, max_side));
-  line.option("-q,--quality", "Q", "0 to 100; 100 is lossless (90)", number(o.quality, 0, 100));
+  line.option("-q,--quality", "Q", "0 to 100; 100 is lossless (90). In this tool -q is not --quiet",
+              number(o.quality, 0, 100));
   line.option("--delta", "D", "In place of a quality: distance allowed, as a fraction of full scale",
               number(o.delta, 0, 1e9));
   line.option("-b,--base", "BASE", "Base level: raw bitmap alpha gray bc1 (raw)",

@@ -88,6 +88,17 @@ Result<int> write_images(const Options& o, Run& run) {
   return 0;
 }
 
+/// A surface of few voxels, as a dense grid, may be larger than anybody expects.
+void warn_of_size(const Options& o, const Input& input, const VolumeInfo& info, Run& run) {
+  constexpr uint64_t many = uint64_t{1} << 30, per_voxel = 64;
+  const uint64_t bytes = raw_bytes(info);
+  if (!input.color || bytes < many || bytes / per_voxel < input.color->params().leaf_voxels) return;
+  run.say(
+      fmt::format("{}: {} voxels become a grid of {:.3g} GB: --roi takes a part; .vdb, .ply and .vox hold "
+                  "voxels only",
+                  o.output, input.color->params().leaf_voxels, static_cast<double>(bytes) / 1e9));
+}
+
 Result<int> work(const Options& o, Run& run) {
   if (run.options.json && o.output == "-")
     return bad_usage("--json and the output - both use standard output");
@@ -122,6 +133,7 @@ Result<int> work(const Options& o, Run& run) {
   VOX_TRY(source, retyped(std::move(source), nullptr, o.type, o.range, run));
   source = fill_restored(std::move(source));
   const VolumeInfo info = source->info();
+  warn_of_size(o, input, info, run);
   VOX_TRY(auto sink, create_volume(o.output, info, run.options.force, run.ctx));
   run.stage("decode");
   const double start = run.seconds();

@@ -6,6 +6,7 @@
 #include "formats/volume/facts.h"
 #include "formats/volume/open_volume.h"
 #include "formats/volume/readers.h"
+#include "formats/volume/volume_formats.h"
 #include "tools/common/color_report.h"
 #include "tools/common/input.h"
 #include "tools/common/json.h"
@@ -34,16 +35,9 @@ std::string_view format_of(const std::string& file, const Input& input) {
   if (input.vq) return "vqv";
   if (input.color) return "dagc";
   if (is_builtin(file)) return "builtin";
-  static constexpr std::pair<std::string_view, std::string_view> endings[] = {
-      {".nhdr", "nrrd"}, {".nii", "nifti"}, {".hdr", "nifti"}, {".img", "nifti"},
-      {".raw", "raw"},   {".vdb", "vdb"},   {".mrc", "mrc"},   {".map", "mrc"},
-      {".ccp4", "mrc"},  {".rec", "mrc"},   {".nrrd", "nrrd"}};
-  std::string_view name = file;
-  for (const std::string_view packed : {".gz", ".bz2"})
-    if (has_ending(name, packed)) name.remove_suffix(packed.size());
-  for (const auto& [ending, format] : endings)
-    if (has_ending(name, ending)) return format;
-  return file == "-" ? "nrrd" : "slices";
+  if (file == "-") return "nrrd";
+  const VolumeFormat* const format = find_volume_format(file);
+  return format ? format->name : "slices";
 }
 
 std::string_view codec_of(const Input& input) {

@@ -320,10 +320,10 @@ Status report(const RenderOptions& o, const Plan& plan, const Drawn& drawn, Outc
   }
   if (run.options.json) VOX_CHECK(print(json.text()));
   if (!run.options.quiet && !run.options.json)
-    fmt::print(
-        stderr, "{}: {} frames of {}x{}, {:.3g} ms a frame, {:.3g} million rays a second{}\n", o.input,
+    tell(fmt::format(
+        "{}: {} frames of {}x{}, {:.3g} ms a frame, {:.3g} million rays a second{}", o.input,
         plan.cameras.size(), o.width, o.height, average, speed,
-        drawn.other ? fmt::format("; {} dB, MS-SSIM {:.6f}", readable(outcome.psnr), outcome.ms_ssim) : "");
+        drawn.other ? fmt::format("; {} dB, MS-SSIM {:.6f}", readable(outcome.psnr), outcome.ms_ssim) : ""));
   return {};
 }
 

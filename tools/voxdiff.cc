@@ -125,8 +125,8 @@ Result<int> compare_volumes(const Options& o, Run& run) {
       json.set("dims", info_a.dims).set("dims_b", info_b.dims).set("passed", false);
       VOX_CHECK(print(json.text()));
     }
-    fmt::print(stderr, "{}: {}: has {} voxels: expected {}, as {}\n", run.tool, o.b, extent(info_b.dims),
-               extent(info_a.dims), o.a);
+    tell(fmt::format("{}: {}: has {} voxels: expected {}, as {}", run.tool, o.b, extent(info_b.dims),
+                     extent(info_a.dims), o.a));
     return 1;
   }
   std::unique_ptr<VolumeSink> sink;
@@ -234,8 +234,8 @@ Result<int> compare_images(const Image& a, const Image& b, const Options& o, Run
       json.set("width_b", b.width()).set("height_b", b.height()).set("passed", false);
       VOX_CHECK(print(json.text()));
     }
-    fmt::print(stderr, "{}: {}: has {} x {} pixels: expected {} x {}, as {}\n", run.tool, o.b, b.width(),
-               b.height(), a.width(), a.height(), o.a);
+    tell(fmt::format("{}: {}: has {} x {} pixels: expected {} x {}, as {}", run.tool, o.b, b.width(),
+                     b.height(), a.width(), a.height(), o.a));
     return 1;
   }
   run.stage("compare");

@@ -173,9 +173,10 @@ Result<int> work(const Options& o, Run& run) {
   if (run.options.json) VOX_CHECK(print(json_of(encoding, run, report).text()));
   if (!run.options.quiet && !run.options.json) print_encoding(encoding);
   if (!run.options.quiet && report.replaced)
-    fmt::print(stderr, "{}: {}: {}\n", run.tool, o.input,
-               options.keep_nan ? "voxels that are infinite became the least or the greatest value"
-                                : "voxels that are NaN or infinite became the least or the greatest value");
+    tell(fmt::format("{}: {}: {}", run.tool, o.input,
+                     options.keep_nan
+                         ? "voxels that are infinite became the least or the greatest value"
+                         : "voxels that are NaN or infinite became the least or the greatest value"));
   return 0;
 }
 

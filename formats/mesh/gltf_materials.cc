@@ -112,6 +112,8 @@ void note_materials(const Json& file, Document& document) {
   if (any("normalTexture", nullptr)) add("normal maps");
   if (any("occlusionTexture", nullptr)) add("occlusion maps");
   if (any("pbrMetallicRoughness", "metallicRoughnessTexture")) add("maps of metal and roughness");
+  if (any("pbrMetallicRoughness", "metallicFactor") || any("pbrMetallicRoughness", "roughnessFactor"))
+    add("metal and roughness");
   if (!dropped.empty()) document.notes.push_back(fmt::format("dropped: {}: only colors are kept", dropped));
 }
 

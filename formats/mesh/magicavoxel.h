@@ -49,10 +49,11 @@ class MagicaVoxelWriter {
 Status check_magicavoxel(const std::string& path, const Index3& dims, uint64_t voxels);
 
 /// Writes a file of version 150: a model for each cube of 256 voxels a side that has any, in a scene that
-/// puts them where they are, turned so that `read_magicavoxel` gives the same places. `palette` has up to 255
-/// colours, R, G and B in sRGB; `voxels` will come. Memory: 8 bytes a voxel. Errors: those of
-/// check_magicavoxel and of OutputFile.
-Result<std::unique_ptr<MagicaVoxelWriter>> create_magicavoxel(const std::string& path, const Index3& dims,
+/// puts them where they are, turned so that `read_magicavoxel` gives the same places. Of `info` dims and
+/// affine count; edges of voxels other than 1, and places between those of voxels, are said to be dropped
+/// (ctx.note). `palette` has up to 255 colours, R, G and B in sRGB; `voxels` will come. Memory: 8 bytes a
+/// voxel. Errors: those of check_magicavoxel and of OutputFile.
+Result<std::unique_ptr<MagicaVoxelWriter>> create_magicavoxel(const std::string& path, const VolumeInfo& info,
                                                               uint64_t voxels,
                                                               std::span<const std::array<uint8_t, 3>> palette,
                                                               bool force, Context& ctx);

@@ -2,6 +2,7 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <cmath>
 #include <cstring>
 #include <map>
 #include <string>
@@ -63,9 +64,10 @@ Chunks placing_node(uint32_t id, uint32_t child, uint32_t layer, const std::stri
 
 class Writer final : public MagicaVoxelWriter {
  public:
-  Writer(const Index3& dims, std::span<const std::array<uint8_t, 3>> palette, std::unique_ptr<OutputFile> out,
-         Reservation memory)
+  Writer(const Index3& dims, const Index3& corner, std::span<const std::array<uint8_t, 3>> palette,
+         std::unique_ptr<OutputFile> out, Reservation memory)
       : dims_(dims),
+        corner_(corner),
         palette_(palette.begin(), palette.end()),
         out_(std::move(out)),
         memory_(std::move(memory)) {}
@@ -108,9 +110,9 @@ class Writer final : public MagicaVoxelWriter {
       const auto size = size_of(cube);
       // A model turns, and moves, about its middle.
       shapes.chunk("nTRN", placing_node(id, id + 1, 0,
-                                        fmt::format("{} {} {}", cube[0] * most_side + size[0] / 2,
-                                                    -size[2] - cube[2] * most_side + size[2] / 2,
-                                                    cube[1] * most_side + size[1] / 2)));
+                                        fmt::format("{} {} {}", corner_.x + cube[0] * most_side + size[0] / 2,
+                                                    -corner_.z - size[2] - cube[2] * most_side + size[2] / 2,
+                                                    corner_.y + cube[1] * most_side + size[1] / 2)));
       Chunks shape;
       for (const uint32_t value : {id + 1, 0u, 1u, number++, 0u}) shape.number(value);
       shapes.chunk("nSHP", shape);
@@ -157,13 +159,37 @@ class Writer final : public MagicaVoxelWriter {
     return size;
   }
 
-  Index3 dims_;
+  Index3 dims_, corner_;
   std::vector<std::array<uint8_t, 3>> palette_;
   std::unique_ptr<OutputFile> out_;
   Reservation memory_;
   std::map<std::array<int32_t, 3>, std::vector<std::byte>>
       models_;  ///< by cube: x, y, z and colour of voxels
 };
+
+/// Where the volume's corner is in a scene, in voxels; what of its place a scene cannot hold is said.
+Index3 corner_of(const VolumeInfo& info, const std::string& path, Context& ctx) {
+  const auto [x, y, z] = info.affine.spacing();
+  const bool cubes = info.affine.is_plain() && x == y && y == z;
+  Index3 corner(0);
+  bool held = cubes;
+  for (int a = 0; a < 3 && held; ++a) {
+    const double at = info.affine.origin[static_cast<size_t>(a)] / x - 0.5;
+    held =
+        std::abs(at - std::round(at)) < 1e-6 && std::abs(at) + static_cast<double>(info.dims[a]) < furthest;
+    if (held) corner[a] = std::llround(at);
+  }
+  if (!held) corner = Index3(0);
+  std::vector<std::string> dropped;
+  if (!info.affine.is_plain())
+    dropped.push_back("the directions of axes");
+  else if (!cubes || x != 1)
+    dropped.push_back("the edges of voxels");
+  if (!held) dropped.push_back("where the volume is");
+  if (!dropped.empty())
+    ctx.note(fmt::format("{}: MagicaVoxel cannot hold {}: dropped", path, fmt::join(dropped, " and ")));
+  return corner;
+}
 
 }  // namespace
 
@@ -174,14 +200,15 @@ Status check_magicavoxel(const std::string& path, const Index3& dims, uint64_t v
                           voxels, dims.x, dims.y, dims.z, most_bytes / 4, furthest));
 }
 
-Result<std::unique_ptr<MagicaVoxelWriter>> create_magicavoxel(const std::string& path, const Index3& dims,
+Result<std::unique_ptr<MagicaVoxelWriter>> create_magicavoxel(const std::string& path, const VolumeInfo& info,
                                                               uint64_t voxels,
                                                               std::span<const std::array<uint8_t, 3>> palette,
                                                               bool force, Context& ctx) {
-  VOX_CHECK(check_magicavoxel(path, dims, voxels));
+  VOX_CHECK(check_magicavoxel(path, info.dims, voxels));
   VOX_TRY(Reservation memory, Reservation::take(voxels * 8, "voxels of models", ctx));
   VOX_TRY(auto out, OutputFile::create(path, force));
-  return std::make_unique<Writer>(dims, palette, std::move(out), std::move(memory));
+  return std::make_unique<Writer>(info.dims, corner_of(info, path, ctx), palette, std::move(out),
+                                  std::move(memory));
 }
 
 }  // namespace voxkit

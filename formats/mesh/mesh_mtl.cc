@@ -111,6 +111,10 @@ class MtlReader {
     } else if (is_any(keyword, {"map_ks", "map_ns", "map_bump", "bump", "norm", "disp", "map_disp", "decal",
                                 "refl", "map_pr", "map_pm", "map_ps", "map_tr", "map_refl"})) {
       library_.dropped.insert(keyword);
+    } else if (is_any(keyword, {"ks", "pr", "pm", "ps", "pc", "tf"})) {
+      // Highlights, metal, sheen and tinted glass; programs write "Ks 0 0 0" into every material.
+      const auto value = number_of(lines_.word());
+      if (value && *value != (keyword == "tf" ? 1 : 0)) library_.dropped.insert(keyword);
     }
     return {};
   }

@@ -207,8 +207,6 @@ Result<SampleLayout> layout_of(const VolumeInfo& info, const std::string& path, 
 }  // namespace
 
 SinkResult create_mrc(const std::string& path, const VolumeInfo& info, bool force, Context& ctx) {
-  if (has_ending(path, ".gz") || has_ending(path, ".bz2"))
-    return fail(ErrorCode::usage, path, "packed MRC files are read only: expected .mrc, .map, .ccp4 or .rec");
   if (is_color(info.format))
     return fail(ErrorCode::usage, path,
                 fmt::format("MRC holds no colours: expected scalars, not {}", name(info.format)));

@@ -82,9 +82,6 @@ nifti_1_header make_header(const std::string& path, const VolumeInfo& info, cons
 }  // namespace
 
 SinkResult create_nifti(const std::string& path, const VolumeInfo& info, bool force, Context& ctx) {
-  if (!has_ending(path, ".nii") && !has_ending(path, ".nii.gz"))
-    return fail(ErrorCode::usage, path,
-                "pairs of a header and an image are read only: expected .nii or .nii.gz");
   for (int i = 0; i < 3; ++i)
     if (info.dims[i] > 32767)
       return fail(ErrorCode::usage, path,

@@ -11,34 +11,12 @@
 
 #include "formats/output_file.h"
 #include "formats/volume/readers.h"
+#include "formats/volume/volume_formats.h"
 
 namespace voxkit {
 namespace {
 
 namespace fs = std::filesystem;
-
-/// Kinds of volume that a name can mean.
-enum class Kind { none, nrrd, nifti, mrc, raw, vdb, image };
-
-struct Ending {
-  std::string_view text;
-  Kind kind;
-};
-constexpr Ending endings[] = {
-    {".nrrd", Kind::nrrd},   {".nhdr", Kind::nrrd},    {".nii", Kind::nifti},    {".nii.gz", Kind::nifti},
-    {".hdr", Kind::nifti},   {".hdr.gz", Kind::nifti}, {".img", Kind::nifti},    {".img.gz", Kind::nifti},
-    {".mrc", Kind::mrc},     {".map", Kind::mrc},      {".ccp4", Kind::mrc},     {".rec", Kind::mrc},
-    {".mrc.gz", Kind::mrc},  {".map.gz", Kind::mrc},   {".ccp4.gz", Kind::mrc},  {".rec.gz", Kind::mrc},
-    {".mrc.bz2", Kind::mrc}, {".map.bz2", Kind::mrc},  {".ccp4.bz2", Kind::mrc}, {".rec.bz2", Kind::mrc},
-    {".raw", Kind::raw},     {".vdb", Kind::vdb},      {".tif", Kind::image},    {".tiff", Kind::image},
-    {".png", Kind::image},   {".exr", Kind::image},
-};
-
-Kind kind_of(const std::string& name) {
-  for (const Ending& ending : endings)
-    if (has_ending(name, ending.text)) return ending.kind;
-  return Kind::none;
-}
 
 /// Whether a file starts as DICOM files do, whatever its name.
 bool is_dicom(const fs::path& path) {
@@ -69,15 +47,23 @@ Result<bool> holds_dicom(const std::string& folder) {
                      [](const std::string& name) { return has_ending(name, ".dcm") || is_dicom(name); });
 }
 
-auto unknown_output(const std::string& name) {
-  return fail(ErrorCode::usage, name,
-              "unknown kind of volume: expected one of .nrrd .nhdr .nii .nii.gz .vdb .raw .mrc .map .ccp4 "
-              ".rec, or a pattern of images such as slice-%04d.tif");
+/// The writer that a name means.
+Result<const VolumeFormat*> writer_of(const std::string& name) {
+  const VolumeFormat* const format = find_volume_format(name);
+  if (!format)
+    return fail(ErrorCode::usage, name,
+                fmt::format("unknown kind of volume: expected one of {}, or a pattern of images such as "
+                            "slice-%04d.tif",
+                            volume_endings(true)));
+  const auto writable = format->endings.first(format->written);
+  if (std::none_of(writable.begin(), writable.end(),
+                   [&](const std::string_view ending) { return has_ending(name, ending); }))
+    return fail(ErrorCode::usage, name,
+                writable.empty() ? "files of this kind are read only"
+                                 : fmt::format("files with this ending are read only: expected {}",
+                                               fmt::join(writable, " ")));
+  return format;
 }
-
-}  // namespace
-
-namespace {
 
 SourceResult open_as_it_is(const std::string& name, const OpenOptions& options, Context& ctx) {
   if (name == "-") return open_nrrd(name, options, ctx);
@@ -92,30 +78,14 @@ SourceResult open_as_it_is(const std::string& name, const OpenOptions& options, 
     VOX_TRY(const bool dicom, holds_dicom(name));
     return dicom ? open_dicom(name, options, ctx) : open_image_stack(name, options, ctx);
   }
-  const Kind kind = kind_of(name);
-  if (has_ending(name, ".dcm") || (kind != Kind::raw && is_dicom(name)))
-    return open_dicom(name, options, ctx);
-  switch (kind) {
-    case Kind::nrrd:
-      return open_nrrd(name, options, ctx);
-    case Kind::nifti:
-      return open_nifti(name, options, ctx);
-    case Kind::mrc:
-      return open_mrc(name, options, ctx);
-    case Kind::raw:
-      return open_raw(name, options, ctx);
-    case Kind::vdb:
-      return open_vdb(name, options, ctx);
-    case Kind::image:
-      return open_image_stack(name, options, ctx);
-    case Kind::none:
-      break;
-  }
-  return bad_input(
-      name,
-      "unknown kind of volume: expected one of .nrrd .nhdr .nii .hdr .img (these three also .gz) .vdb .raw "
-      ".mrc .map .ccp4 .rec (these four also .gz or .bz2), images (.tif .png .exr, a folder or a pattern), a "
-      "DICOM file or a folder of them, or a built-in such as menger:5");
+  const VolumeFormat* const format = find_volume_format(name);
+  if ((!format || format->name != "raw") && is_dicom(name)) return open_dicom(name, options, ctx);
+  if (format) return format->open(name, options, ctx);
+  return bad_input(name,
+                   fmt::format("unknown kind of file: expected a volume ({}), images (.tif .png .exr, a "
+                               "folder or a pattern), a folder of DICOM files, {}or a built-in such as "
+                               "menger:5",
+                               volume_endings(false), options.other_kinds));
 }
 
 }  // namespace
@@ -133,32 +103,17 @@ Result<std::unique_ptr<VolumeSink>> create_volume(const std::string& name, const
   if (!checked_voxels(info.dims))
     return fail(ErrorCode::internal, name, "the volume to write has no voxels, or too many");
   if (name == "-") return create_nrrd(name, info, force, ctx);
-  const Kind kind = kind_of(name);
-  if (is_wide(info.sample_type) && info.format != VoxelFormat::float32 && !is_color(info.format) &&
-      (kind == Kind::vdb || kind == Kind::image))
+  VOX_TRY(const VolumeFormat* const format, writer_of(name));
+  const bool wide =
+      is_wide(info.sample_type) && info.format != VoxelFormat::float32 && !is_color(info.format);
+  if (wide && !format->wide_integers)
     return fail(
         ErrorCode::usage, name,
         fmt::format(
             "files with this ending hold no {}: expected .nrrd, .nii or .raw, or another type (--type, or "
             "--output-type of vox-convert)",
             voxkit::name(info.sample_type)));
-  switch (kind) {
-    case Kind::nrrd:
-      return create_nrrd(name, info, force, ctx);
-    case Kind::nifti:
-      return create_nifti(name, info, force, ctx);
-    case Kind::mrc:
-      return create_mrc(name, info, force, ctx);
-    case Kind::raw:
-      return create_raw(name, info, force, ctx);
-    case Kind::vdb:
-      return create_vdb(name, info, force, ctx);
-    case Kind::image:
-      return create_image_stack(name, info, force, ctx);
-    case Kind::none:
-      break;
-  }
-  return unknown_output(name);
+  return format->create(name, info, force, ctx);
 }
 
 Status check_not_written(const VolumeInfo& info, const OpenOptions& options) {
@@ -184,7 +139,8 @@ Status check_not_written(const VolumeInfo& info, const OpenOptions& options) {
 }
 
 std::vector<std::string> files_of_output(const std::string& name) {
-  if (name == "-" || kind_of(name) == Kind::image) return {};
+  const VolumeFormat* const format = find_volume_format(name);
+  if (name == "-" || (format && format->images)) return {};
   std::vector<std::string> files{name};
   if (const std::string data = nrrd_data_file(name); !data.empty()) files.push_back(data);
   return files;
@@ -192,7 +148,7 @@ std::vector<std::string> files_of_output(const std::string& name) {
 
 Status check_volume_output(const std::string& name, bool force) {
   if (name == "-") return check_output(name, force);
-  if (kind_of(name) == Kind::none) return unknown_output(name);
+  VOX_CHECK(writer_of(name));
   for (const std::string& file : files_of_output(name)) VOX_CHECK(check_output(file, force));
   return {};
 }

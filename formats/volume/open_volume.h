@@ -37,6 +37,8 @@ struct OpenOptions {
   /// Files and patterns that will be written: an input that consists of one of them is refused
   /// (ErrorCode::usage).
   std::vector<std::string> outputs;
+  /// What else the caller reads, which the error of an unknown ending names: "compressed volumes (.svmm), ".
+  std::string other_kinds = {};
 };
 
 /// Opens a file or a built-in by its name; reads headers, no voxels. "-" is NRRD on standard input.

@@ -1,5 +1,7 @@
 #include "libcolor/textures/texture.h"
 
+#include <fmt/format.h>
+
 #include <algorithm>
 #include <vector>
 
@@ -131,6 +133,13 @@ void TextureReader::decode(uint32_t block) {
     std::copy(pixels.begin(), pixels.end(), pixels_.begin());
   }
   block_ = block;
+}
+
+std::string check_texture_part(std::span<const std::byte> part, const Params& params, uint32_t colors) {
+  TextureReader reader;
+  reader.open(part.data(), params, colors);
+  const uint32_t invalid = reader.first_invalid();
+  return invalid == reader.blocks() ? "" : fmt::format("block {}: not a valid one", invalid);
 }
 
 }  // namespace voxkit::color

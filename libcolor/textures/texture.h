@@ -4,6 +4,7 @@
 
 #include <array>
 #include <span>
+#include <string>
 
 #include "libcolor/encoded_part.h"
 #include "libcolor/params.h"
@@ -53,5 +54,8 @@ class TextureReader {
   uint32_t block_ = ~uint32_t{0};
   std::array<Rgb, most_block_pixels> pixels_;
 };
+
+/// What in a part of so many colours is not as FORMAT.md says, in words; empty if nothing is.
+std::string check_texture_part(std::span<const std::byte> part, const Params& params, uint32_t colors);
 
 }  // namespace voxkit::color

@@ -222,7 +222,12 @@ TEST_F(MagicaVoxel, WhatIsWrittenIsReadInItsPlace) {
   const std::string path =
       (std::filesystem::temp_directory_path() / ("voxkit-" + std::to_string(getpid()) + "-written.vox"))
           .string();
-  auto writer = create_magicavoxel(path, dims, voxels.size(), palette, false, ctx_);
+  VolumeInfo info;
+  info.dims = dims;
+  info.affine = Affine::plain({1, 1, 1}, {10.5, -399.5, 7.5});
+  std::vector<std::string> notes;
+  ctx_.note = [&notes](const std::string& line) { notes.push_back(line); };
+  auto writer = create_magicavoxel(path, info, voxels.size(), palette, false, ctx_);
   ASSERT_TRUE(writer) << writer.error().what;
   ASSERT_TRUE((*writer)->add(std::span(voxels).first(1000)));
   ASSERT_TRUE((*writer)->add(std::span(voxels).subspan(1000)));
@@ -232,12 +237,21 @@ TEST_F(MagicaVoxel, WhatIsWrittenIsReadInItsPlace) {
   std::filesystem::remove(path);
   ASSERT_TRUE(scene) << scene.error().what;
   std::map<Place, Color> found;
-  for (const ModelVoxel& v : scene->voxels) found.emplace(v.place, v.color);
+  for (const ModelVoxel& v : scene->voxels)
+    found.emplace(Place{v.place[0] - 10, v.place[1] + 400, v.place[2] - 7}, v.color);
   EXPECT_EQ(found, expected);
+  EXPECT_TRUE(notes.empty()) << notes.front();
+
+  // What a scene cannot say of a place is said.
+  info.affine = Affine::plain({0.5, 0.5, 0.5}, {0.25, 0.3, 0.25});
+  ASSERT_TRUE(create_magicavoxel(path, info, 1, palette, false, ctx_));
+  ASSERT_EQ(notes.size(), 1u);
+  EXPECT_NE(notes[0].find("the edges of voxels and where the volume is"), std::string::npos) << notes[0];
 
   for (const auto& [side, count] :
        {std::pair<int64_t, uint64_t>{(1 << 20) + 1, 1}, {100, uint64_t{1} << 29}}) {
-    const auto large = create_magicavoxel(path, Index3(side, 9, 9), count, palette, false, ctx_);
+    info.dims = Index3(side, 9, 9);
+    const auto large = create_magicavoxel(path, info, count, palette, false, ctx_);
     ASSERT_FALSE(large);
     EXPECT_EQ(large.error().code, ErrorCode::limit);
   }

@@ -4,25 +4,9 @@
 
 #include <algorithm>
 
+#include "libcolor/part_codecs.h"
+
 namespace voxkit::cli {
-namespace {
-
-/// By number.
-constexpr std::string_view codec_names[] = {"",    "raw",     "fws",  "vws", "bc1", "astc",
-                                            "bc7", "palette", "jpeg", "jp2", "png"};
-
-}  // namespace
-
-std::string_view name(color::ColorCodec codec) {
-  return codec_names[static_cast<size_t>(codec)];
-}
-
-std::optional<color::ColorCodec> codec_named(std::string_view text) {
-  const auto* const at = std::find(std::begin(codec_names), std::end(codec_names), text);
-  if (at == std::end(codec_names)) return std::nullopt;
-  return static_cast<color::ColorCodec>(at - std::begin(codec_names));
-}
-
 std::string_view name(color::ImageCurve curve) {
   return curve == color::ImageCurve::morton ? "morton" : "hilbert";
 }
@@ -32,7 +16,7 @@ std::string_view name(color::Curve curve) {
 
 Json params_json(const color::Params& p) {
   Json json = Json::object();
-  json.set("codec", name(p.codec));
+  json.set("codec", color::part_codec(p.codec).name);
   if (color::has_threshold(p.codec)) {
     json.set("threshold", p.threshold);
     json.set("space", p.space == color::ErrorSpace::lab ? "lab" : "srgb");
@@ -68,7 +52,7 @@ std::string sizes_text(const color::Params& p) {
       p.dag_bytes,
       8 * static_cast<double>(p.dag_bytes) / static_cast<double>(std::max<uint64_t>(p.leaf_voxels, 1)));
   text += fmt::format("colors      {}, {} of {}, {} bytes ({:.4g} % of 24 bits), error {:.4g} a channel\n",
-                      name(p.codec), p.color_count,
+                      color::part_codec(p.codec).name, p.color_count,
                       p.colors == color::Colors::leaf ? "voxels" : "voxels and nodes", p.color_bytes,
                       color_percent(p), p.grmse);
   if (color::makes_textures(p.codec))

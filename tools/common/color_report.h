@@ -10,9 +10,6 @@
 
 namespace voxkit::cli {
 
-std::string_view name(color::ColorCodec codec);
-/// The codec of that name.
-std::optional<color::ColorCodec> codec_named(std::string_view text);
 std::string_view name(color::ImageCurve curve);
 Json params_json(const color::Params& params);
 /// Sizes: leaf_voxels, dag_nodes, dag_bytes, color_count, color_bytes, macro_blocks, blocks.

@@ -93,11 +93,11 @@ void print_encoding(const Encoding& e) {
   std::string share = fmt::format("{:.4g} % of raw", 100 * bytes / raw);
   if (const auto input = file_bytes(e.input); input && *input > 0)
     share += fmt::format(", {:.4g} % of the input", 100 * bytes / static_cast<double>(*input));
-  fmt::print(
-      stderr, "{}: {} -> {} bytes ({}), {}, in {:.2f} s{}\n", e.output, raw_bytes(e.info), e.file_bytes,
-      share, e.lossless ? "lossless" : "lossy", e.seconds,
+  tell(fmt::format(
+      "{}: {} -> {} bytes ({}), {}, in {:.2f} s{}", e.output, raw_bytes(e.info), e.file_bytes, share,
+      e.lossless ? "lossless" : "lossy", e.seconds,
       e.diff ? fmt::format(", {} dB, greatest error {:.6g}", readable(e.diff->psnr_db), e.diff->max_abs_error)
-             : "");
+             : ""));
 }
 
 }  // namespace voxkit::cli

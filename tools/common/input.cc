@@ -97,6 +97,7 @@ void declare_input_options(CommandLine& line, OpenOptions& options, bool type) {
               integer(options.channel, 0, most_parts));
   line.text("--series", "ID",
             "Of a folder with several DICOM series: the number or the end of the UID of one", options.series);
+  options.other_kinds = "compressed volumes (.svmm .vqv .dagc), ";
   line.flag("--labels", "The values of the input are names of things: they have no averages", options.labels);
   line.option("--fill", "V", "The value of the input that stands for nothing measured",
               [&options](const std::string& text) -> Status {

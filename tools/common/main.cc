@@ -85,7 +85,7 @@ void Run::say(const std::string& line) {
 }
 
 void Run::note(const std::string& line) const {
-  if (options.verbose) fmt::print(stderr, "{}: {}\n", tool, line);
+  if (options.verbose) tell(fmt::format("{}: {}", tool, line));
 }
 
 double Run::seconds() const {
@@ -126,10 +126,16 @@ void report(const std::string& tool, const Error& error) {
   // A file name, or the message of a library, may have line feeds.
   for (char& c : line)
     if (static_cast<unsigned char>(c) < ' ' || c == '\x7f') c = ' ';
+  tell(line);
+}
+
+void tell(const std::string& line) {
+  Progress::clear();
   fmt::print(stderr, "{}\n", line);
 }
 
 Status print(const std::string& text) {
+  Progress::clear();
   const char* at = text.data();
   size_t left = text.size();
   while (left > 0) {

@@ -58,6 +58,9 @@ int run_tool(int argc, char** argv, const std::string& tool, const std::string& 
 /// One line about an error on standard error: "TOOL: FILE: what is wrong: what was expected".
 void report(const std::string& tool, const Error& error);
 
+/// One line for people on standard error, such as what was done.
+void tell(const std::string& line);
+
 /// Writes to standard output; ErrorCode::output if that fails.
 Status print(const std::string& text);
 

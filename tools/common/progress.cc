@@ -3,6 +3,7 @@
 #include <fmt/core.h>
 #include <unistd.h>
 
+#include <atomic>
 #include <chrono>
 #include <cstdio>
 #include <utility>
@@ -11,12 +12,22 @@ namespace voxkit::cli {
 
 using namespace std::chrono_literals;
 
+namespace {
+
+std::atomic<bool> on_terminal{false};  ///< whether the last line there is one of progress
+
+}  // namespace
+
 Progress::Progress(ProgressMode mode, std::string stage) : mode_(mode), stage_(std::move(stage)) {
   if (mode_ == ProgressMode::automatic && !isatty(STDERR_FILENO)) mode_ = ProgressMode::never;
 }
 
 Progress::~Progress() {
-  if (shown_ && mode_ == ProgressMode::automatic) fmt::print(stderr, "\r\033[K");
+  clear();
+}
+
+void Progress::clear() {
+  if (on_terminal.exchange(false)) fmt::print(stderr, "\r\033[K");
 }
 
 void Progress::detail(const std::string& text) {
@@ -41,6 +52,7 @@ void Progress::update(double fraction) {
   } else if (mode_ == ProgressMode::automatic) {
     if (now - start_ < 1s || (shown_ && now - last_ < 100ms)) return;
     shown_ = true;
+    on_terminal = true;
     last_ = now;
     fmt::print(stderr, "\r{} {:3.0f} %{}{}\033[K", stage_, 100 * fraction, detail_.empty() ? "" : ", ",
                detail_);

@@ -20,6 +20,8 @@ class Progress {
   void update(double fraction);
   /// What else there is to know, such as "iteration=3 psnr_db=41.2", from now on. plain: a line of its own.
   void detail(const std::string& text);
+  /// Takes the line off the terminal, where there is one, before something else is printed there.
+  static void clear();
 
  private:
   ProgressMode mode_;

@@ -39,7 +39,9 @@ Surface open_any(const std::string& name, const SurfaceOptions& options, Context
     VOX_TRY(VoxelScene scene, read_magicavoxel(name, ctx, options.frame.value_or(0)));
     return color::surface_of(std::move(scene), ctx);
   }
-  VOX_TRY(Input input, open_input(name, options.open, ctx));
+  OpenOptions open = options.open;
+  open.other_kinds += "meshes (.obj .gltf .glb .ply), models (.vox), ";
+  VOX_TRY(Input input, open_input(name, open, ctx));
   return color::surface_of(std::move(input.source));
 }
 

@@ -93,7 +93,7 @@ Status write_models(const color::Volume& volume, const std::string& name, bool f
   }
   std::vector<std::array<uint8_t, 3>> chosen;
   for (const color::Rgb& c : palette.colors()) chosen.push_back({c.r, c.g, c.b});
-  VOX_TRY(auto writer, create_magicavoxel(name, volume.info().dims, count, chosen, force, ctx));
+  VOX_TRY(auto writer, create_magicavoxel(name, volume.info(), count, chosen, force, ctx));
   std::vector<IndexedVoxel> run;
   VOX_CHECK(volume.for_each_voxel(
       [&](Voxels voxels) -> Status {
