@@ -1,0 +1,141 @@
+#include <algorithm>
+#include <limits>
+
+#include "libpage/decode_kernel.h"
+#include "libpage/page.h"
+
+namespace voxkit::page {
+namespace {
+
+template <class T>
+T sample_of(const ModelData& model, uint32_t value) {
+  return static_cast<T>(model.palette.empty() ? value : model.palette[value]);
+}
+
+/// Pages of one extent, all of them with residuals.
+template <class Width, int lane_count, class T>
+void decode_group(const ModelData& model, const PageJob<T>* const* jobs, bool* whole) {
+  std::array<Lane<Width>, lane_count> lanes;
+  std::array<T*, lane_count> out;
+  for (size_t n = 0; n < lane_count; ++n) {
+    lanes[n].coder.open(jobs[n]->page);
+    out[n] = jobs[n]->out.data();
+  }
+  const Extent extent = jobs[0]->extent;
+  decode_lanes<Width, lane_count>(
+      model, extent, lanes, [&](size_t n, int, int, const typename Width::Stored* row) {
+        const auto nx = static_cast<size_t>(extent.nx);
+        if (model.palette.empty()) {
+          for (size_t x = 0; x < nx; ++x)
+            out[n][x] = static_cast<T>(static_cast<uint32_t>(row[x]) + static_cast<uint32_t>(Width::offset));
+        } else {
+          for (size_t x = 0; x < nx; ++x)
+            out[n][x] = static_cast<T>(
+                model.palette[static_cast<uint32_t>(row[x]) + static_cast<uint32_t>(Width::offset)]);
+        }
+        out[n] += nx;
+      });
+  for (size_t n = 0; n < lane_count; ++n) whole[n] = lanes[n].coder.finished();
+}
+
+template <class T>
+Status usable(const Model& model, const PageJob<T>& job) {
+  if (!job.extent.valid() || job.out.size() != static_cast<size_t>(job.extent.voxels()))
+    return bad_usage("a page decoded into another number of samples than its extent: expected room for all");
+  if (model.max_sample() > std::numeric_limits<T>::max())
+    return bad_usage("a page decoded into samples of too few bits: expected those of its model");
+  return {};
+}
+
+/// Pages without residuals. False: it has some.
+template <class T>
+bool decode_constant(const ModelData& model, const PageJob<T>& job, bool& whole) {
+  whole = true;
+  if (job.page.size() > model.value_bytes()) return false;
+  uint32_t value = model.background;
+  if (!job.page.empty()) {
+    value = 0;
+    for (size_t i = 0; i < job.page.size(); ++i) value |= std::to_integer<uint32_t>(job.page[i]) << 8 * i;
+    whole = job.page.size() == model.value_bytes() && value <= model.max_value;
+    if (!whole) return true;
+  }
+  std::ranges::fill(job.out, sample_of<T>(model, value));
+  return true;
+}
+
+Status damaged() {
+  return bad_input({}, "page: it does not end where its symbols end: expected a page of this model and extent");
+}
+
+template <class T>
+Status decode_all(const Model& shared, std::span<const PageJob<T>> jobs, size_t* failed) {
+  const ModelData& model = shared.data();
+  for (const PageJob<T>& job : jobs) VOX_CHECK(usable(shared, job));
+  size_t bad = jobs.size();
+  constexpr size_t group = 4;
+  std::array<const PageJob<T>*, group> waiting;
+  size_t count = 0;
+  const auto judge = [&](const PageJob<T>* job, bool whole) {
+    if (!whole) bad = std::min(bad, static_cast<size_t>(job - jobs.data()));
+  };
+  const auto decode_waiting = [&] {
+    std::array<bool, group> whole{};
+    if (count == group) {
+      if (model.wide())
+        decode_group<Wide, group>(model, waiting.data(), whole.data());
+      else
+        decode_group<Narrow, group>(model, waiting.data(), whole.data());
+    } else {
+      for (size_t n = 0; n < count; ++n)
+        if (model.wide())
+          decode_group<Wide, 1>(model, &waiting[n], &whole[n]);
+        else
+          decode_group<Narrow, 1>(model, &waiting[n], &whole[n]);
+    }
+    for (size_t n = 0; n < count; ++n) judge(waiting[n], whole[n]);
+    count = 0;
+  };
+  for (const PageJob<T>& job : jobs) {
+    bool whole = true;
+    if (decode_constant(model, job, whole)) {
+      judge(&job, whole);
+      continue;
+    }
+    if (count != 0 && waiting[0]->extent != job.extent) decode_waiting();
+    waiting[count++] = &job;
+    if (count == group) decode_waiting();
+  }
+  decode_waiting();
+  if (failed) *failed = bad;
+  if (bad != jobs.size()) return damaged();
+  return {};
+}
+
+template <class T>
+Status decode_one(const Model& model, std::span<const std::byte> page, Extent extent, std::span<T> out) {
+  const PageJob<T> job{page, extent, out};
+  return decode_all<T>(model, std::span<const PageJob<T>>(&job, 1), nullptr);
+}
+
+}  // namespace
+
+Status decode_page(const Model& model, std::span<const std::byte> page, Extent extent, std::span<uint8_t> out) {
+  return decode_one(model, page, extent, out);
+}
+Status decode_page(const Model& model, std::span<const std::byte> page, Extent extent, std::span<uint16_t> out) {
+  return decode_one(model, page, extent, out);
+}
+Status decode_page(const Model& model, std::span<const std::byte> page, Extent extent, std::span<uint32_t> out) {
+  return decode_one(model, page, extent, out);
+}
+Status decode_pages(const Model& model, std::span<const PageJob<uint8_t>> jobs, size_t* failed) {
+  return decode_all(model, jobs, failed);
+}
+Status decode_pages(const Model& model, std::span<const PageJob<uint16_t>> jobs, size_t* failed) {
+  return decode_all(model, jobs, failed);
+}
+Status decode_pages(const Model& model, std::span<const PageJob<uint32_t>> jobs, size_t* failed) {
+  return decode_all(model, jobs, failed);
+}
+
+}  // namespace voxkit::page

@@ -1,0 +1,89 @@
+#include <algorithm>
+
+#include "libpage/encode_kernel.h"
+#include "libpage/page.h"
+#include "libpage/rans.h"
+
+namespace voxkit::page {
+namespace {
+
+template <class Width>
+void write_residuals(const ModelData& model, const Residuals& residuals, std::vector<std::byte>& out) {
+  static constexpr auto bins = make_bins(Width::escape_bits);
+  RansEncoder coder;
+  for (auto i = static_cast<size_t>(residuals.count); i-- > 0;) {
+    const size_t context = residuals.context[i];
+    const Frequencies& table = model.tables[context];
+    uint32_t symbol = symbol_of(residuals.folded[i]);
+    if (table[symbol] == 0) symbol = escape_symbol;
+    const uint32_t raw = residuals.folded[i] - bins[symbol].base, raw_bits = bins[symbol].raw_bits;
+    if constexpr (Width::escape_bits <= 21) {
+      coder.put(table[symbol], model.starts[context][symbol], raw, raw_bits);
+    } else {
+      const uint32_t low_bits = std::min(raw_bits, 16u);
+      coder.put_raw(raw >> low_bits, raw_bits - low_bits);
+      coder.put_raw(raw & ((1u << low_bits) - 1), low_bits);
+      coder.put(table[symbol], model.starts[context][symbol], 0, 0);
+    }
+  }
+  coder.finish(out, model.value_bytes());
+}
+
+template <class T>
+Status encode(const Model& shared, std::span<const T> samples, Extent extent, std::vector<std::byte>& out) {
+  const ModelData& model = shared.data();
+  if (!extent.valid() || samples.size() != static_cast<size_t>(extent.voxels()))
+    return bad_usage("a page of another number of samples than its extent: expected them all");
+  std::array<uint32_t, max_voxels> values;
+  if (model.palette.empty()) {
+    std::ranges::copy(samples, values.begin());
+  } else {
+    for (size_t i = 0; i < samples.size(); ++i) {
+      const auto at = std::ranges::lower_bound(model.palette, samples[i]);
+      if (at == model.palette.end() || *at != samples[i])
+        return bad_usage("a sample that the palette of the model lacks: expected all values when it was made");
+      values[i] = static_cast<uint32_t>(at - model.palette.begin());
+    }
+  }
+  const std::span<const uint32_t> page(values.data(), samples.size());
+  const auto [least, greatest] = std::ranges::minmax(page);
+  if (greatest > model.max_value)
+    return bad_usage("a sample above the greatest of the model: expected max_sample to be that of all pages");
+  if (greatest - least <= 2 * uint64_t{model.max_error}) {
+    const auto covers = [&](uint32_t value) {
+      return int64_t{greatest} - int64_t{value} <= int64_t{model.max_error} &&
+             int64_t{value} - int64_t{least} <= int64_t{model.max_error};
+    };
+    if (covers(model.background)) return {};
+    const uint32_t middle = least + (greatest - least) / 2;
+    for (size_t byte = 0; byte < model.value_bytes(); ++byte)
+      out.push_back(static_cast<std::byte>(middle >> 8 * byte & 0xff));
+    return {};
+  }
+  Residuals residuals;
+  if (model.wide()) {
+    find_residuals<Wide>(model, page, extent, residuals);
+    write_residuals<Wide>(model, residuals, out);
+  } else {
+    find_residuals<Narrow>(model, page, extent, residuals);
+    write_residuals<Narrow>(model, residuals, out);
+  }
+  return {};
+}
+
+}  // namespace
+
+Status encode_page(const Model& model, std::span<const uint8_t> samples, Extent extent,
+                   std::vector<std::byte>& out) {
+  return encode(model, samples, extent, out);
+}
+Status encode_page(const Model& model, std::span<const uint16_t> samples, Extent extent,
+                   std::vector<std::byte>& out) {
+  return encode(model, samples, extent, out);
+}
+Status encode_page(const Model& model, std::span<const uint32_t> samples, Extent extent,
+                   std::vector<std::byte>& out) {
+  return encode(model, samples, extent, out);
+}
+
+}  // namespace voxkit::page

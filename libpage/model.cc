@@ -1,0 +1,141 @@
+#include <algorithm>
+#include <cstdlib>
+
+#include "libpage/model_data.h"
+#include "libpage/page.h"
+
+namespace voxkit::page {
+namespace {
+
+constexpr uint32_t format_version = 1;
+constexpr int weight_golomb = 7, palette_golomb = 2;
+
+tl::unexpected<Error> wrong(const char* what) {
+  return bad_input({}, std::string("page model: ") + what);
+}
+
+void write_weights(BitWriter& out, const Weights& weights, int voxel_class) {
+  for (int t = 0; t < tap_count; ++t)
+    if (has_tap(voxel_class, t) && t != rest_tap(voxel_class))
+      out.signed_golomb(weights[static_cast<size_t>(t)], weight_golomb);
+}
+
+bool read_weights(BitReader& in, Weights& weights, int voxel_class) {
+  weights = {};
+  const int rest = rest_tap(voxel_class);
+  if (rest < 0) return true;
+  int64_t left = weight_one, size = 0;
+  for (int t = 0; t < tap_count; ++t) {
+    if (!has_tap(voxel_class, t) || t == rest) continue;
+    const int32_t weight = in.signed_golomb(weight_golomb);
+    if (weight > INT16_MAX || weight < -INT16_MAX) return false;
+    weights[static_cast<size_t>(t)] = static_cast<int16_t>(weight);
+    left -= weight;
+    size += std::abs(weight);
+  }
+  if (std::abs(left) > INT16_MAX || size + std::abs(left) > most_weight) return false;
+  weights[static_cast<size_t>(rest)] = static_cast<int16_t>(left);
+  return true;
+}
+
+}  // namespace
+
+void ModelData::derive() {
+  size_t next = 0;
+  for (uint32_t activity = 0; activity <= most_activity; ++activity) {
+    while (next < thresholds.size() && activity >= thresholds[next]) ++next;
+    step_of[activity] = static_cast<uint8_t>(next);
+  }
+  slots.resize(size_t{context_count} * table_total);
+  for (size_t c = 0; c < context_count; ++c) {
+    starts[c] = page::starts(tables[c]);
+    fill_slots(tables[c], std::span<uint32_t, table_total>(slots.data() + c * table_total, table_total));
+  }
+}
+
+std::vector<std::byte> Model::serialise() const {
+  const ModelData& m = *data_;
+  BitWriter out;
+  out.put(format_version, 8);
+  out.put(m.palette.empty() ? 0 : 1, 1);
+  out.put(m.max_value, 32);
+  out.golomb(m.max_error, 0);
+  out.golomb(m.background, 8);
+  uint32_t before = 0;
+  for (size_t i = 0; i < m.palette.size(); ++i) {
+    out.golomb(m.palette[i] - before, palette_golomb);
+    before = m.palette[i] + 1;
+  }
+  for (int c = 0; c < class_count; ++c) write_weights(out, m.weights[static_cast<size_t>(c)], c);
+  uint32_t threshold = 0;
+  for (const uint16_t next : m.thresholds) {
+    out.golomb(next - threshold, 2);
+    threshold = next;
+  }
+  const Frequencies* previous = nullptr;
+  for (const Frequencies& table : m.tables) {
+    const bool same = previous && table == *previous;
+    out.put(same ? 1 : 0, 1);
+    if (!same) write_frequencies(out, table);
+    previous = &table;
+  }
+  return out.take();
+}
+
+Result<Model> Model::parse(std::span<const std::byte> bytes) {
+  BitReader in(bytes);
+  if (in.get(8) != format_version) return wrong("unknown version: expected 1");
+  auto made = std::make_shared<ModelData>();
+  ModelData& m = *made;
+  const bool has_palette = in.get(1) != 0;
+  m.max_value = in.get(32);
+  m.max_error = in.golomb(0);
+  m.background = in.golomb(8);
+  if (in.overrun()) return wrong("cut off: expected its bounds");
+  if (m.max_error > most_error) return wrong("error bound: expected at most 2^31 - 1");
+  if (m.background > m.max_value) return wrong("background: expected at most the greatest sample");
+  if (has_palette) {
+    if (m.max_error != 0 || m.max_value > 0xffff)
+      return wrong("palette: expected at most 65536 entries, and no error");
+    uint64_t next = 0;
+    for (uint32_t i = 0; i <= m.max_value; ++i) {
+      const uint64_t value = next + in.golomb(palette_golomb);
+      if (in.overrun() || value > UINT32_MAX) return wrong("palette: expected ascending values of 32 bits");
+      m.palette.push_back(static_cast<uint32_t>(value));
+      next = value + 1;
+    }
+  }
+  for (int c = 0; c < class_count; ++c)
+    if (!read_weights(in, m.weights[static_cast<size_t>(c)], c) || in.overrun())
+      return wrong("weights: expected a sum of magnitudes below 16");
+  uint32_t threshold = 0;
+  for (uint16_t& next : m.thresholds) {
+    const uint64_t sum = uint64_t{threshold} + in.golomb(2);
+    if (sum > most_activity || in.overrun()) return wrong("thresholds: expected at most 2040, ascending");
+    next = static_cast<uint16_t>(sum);
+    threshold = next;
+  }
+  for (size_t c = 0; c < context_count; ++c) {
+    const bool same = in.get(1) != 0;
+    if (same && c == 0) return wrong("tables: expected one before that is the same");
+    if (same)
+      m.tables[c] = m.tables[c - 1];
+    else if (!read_frequencies(in, m.tables[c]))
+      return wrong("table of probabilities: expected parts of 2048 that leave some to the escape");
+  }
+  if (!in.at_end()) return wrong("expected it to end with its last table");
+  m.derive();
+  return Model(std::move(made));
+}
+
+uint32_t Model::max_error() const {
+  return data_->max_error;
+}
+uint32_t Model::max_sample() const {
+  return data_->palette.empty() ? data_->max_value : data_->palette.back();
+}
+uint32_t Model::background() const {
+  return data_->palette.empty() ? data_->background : data_->palette[data_->background];
+}
+
+}  // namespace voxkit::page

@@ -1,0 +1,148 @@
+#include <algorithm>
+#include <functional>
+#include <map>
+
+#include "libpage/encode_kernel.h"
+#include "libpage/fit.h"
+#include "libpage/page.h"
+
+namespace voxkit::page {
+namespace {
+
+using Counts = std::array<uint64_t, symbol_count>;
+
+/// A page as numbers of the model.
+struct Sampled {
+  Extent extent;
+  std::vector<uint32_t> values;
+  std::vector<uint32_t> decoded;
+};
+
+bool is_constant(const ModelData& model, const Sampled& page) {
+  const auto [least, greatest] = std::ranges::minmax(page.values);
+  return greatest - least <= 2 * uint64_t{model.max_error};
+}
+
+/// The value that most pages of one value have; else the most frequent of first voxels.
+uint32_t common_value(const ModelData& model, const std::vector<Sampled>& pages) {
+  std::map<uint32_t, uint64_t> constants, firsts;
+  for (const Sampled& page : pages) {
+    const auto [least, greatest] = std::ranges::minmax(page.values);
+    if (greatest - least <= 2 * uint64_t{model.max_error}) ++constants[least + (greatest - least) / 2];
+    ++firsts[page.values[0]];
+  }
+  const auto& votes = constants.empty() ? firsts : constants;
+  uint32_t best = 0;
+  uint64_t most = 0;
+  for (const auto& [value, count] : votes)
+    if (count > most) {
+      best = value;
+      most = count;
+    }
+  return best;
+}
+
+void run(const ModelData& model, const Sampled& page, Residuals& out, uint32_t* decoded) {
+  if (model.wide())
+    find_residuals<Wide>(model, page.values, page.extent, out, decoded);
+  else
+    find_residuals<Narrow>(model, page.values, page.extent, out, decoded);
+}
+
+/// Tables of what pages consist of with the weights that the model has.
+void fit_tables(ModelData& model, std::vector<Sampled>& pages) {
+  std::vector<Counts> counts(context_count);
+  Residuals residuals;
+  for (Sampled& page : pages) {
+    if (is_constant(model, page)) continue;
+    page.decoded.resize(page.values.size());
+    run(model, page, residuals, page.decoded.data());
+    for (size_t i = 0; i < page.values.size(); ++i)
+      ++counts[residuals.context[i]][symbol_of(residuals.folded[i])];
+  }
+  for (size_t c = 0; c < context_count; ++c) model.tables[c] = normalise(counts[c]);
+}
+
+void fit(ModelData& model, std::vector<Sampled>& pages) {
+  model.background = common_value(model, pages);
+  const double e = model.max_error;
+  std::vector<FitPage> sources;
+  for (const Sampled& page : pages)
+    if (!is_constant(model, page)) sources.push_back({page.extent, page.values, page.values});
+  model.weights = fit_weights(sources, (4 * e * e + 4 * e) / 12);
+  model.derive();
+  fit_tables(model, pages);
+  model.derive();
+}
+
+}  // namespace
+
+void ModelBuilder::add(std::span<const uint8_t> samples, Extent extent) {
+  pages_.push_back({extent, {samples.begin(), samples.end()}});
+}
+void ModelBuilder::add(std::span<const uint16_t> samples, Extent extent) {
+  pages_.push_back({extent, {samples.begin(), samples.end()}});
+}
+void ModelBuilder::add(std::span<const uint32_t> samples, Extent extent) {
+  pages_.push_back({extent, {samples.begin(), samples.end()}});
+}
+
+namespace {
+
+/// Bytes of the model and of the pages it was made from.
+Result<size_t> size_with(const Model& model, std::span<const ModelBuilder::Page> pages) {
+  std::vector<std::byte> bytes = model.serialise();
+  for (const ModelBuilder::Page& page : pages)
+    VOX_CHECK(encode_page(model, std::span<const uint32_t>(page.samples), page.extent, bytes));
+  return bytes.size();
+}
+
+/// The numbers that samples have in an ascending palette, or themselves where it is empty. False: one is
+/// missing.
+bool number(std::span<const uint32_t> palette, std::vector<uint32_t>& samples) {
+  if (palette.empty()) return true;
+  for (uint32_t& sample : samples) {
+    const auto at = std::ranges::lower_bound(palette, sample);
+    if (at == palette.end() || *at != sample) return false;
+    sample = static_cast<uint32_t>(at - palette.begin());
+  }
+  return true;
+}
+
+}  // namespace
+
+Result<Model> ModelBuilder::build(const ModelOptions& options) const {
+  const std::vector<uint32_t>& values = options.values;
+  if (options.max_error > most_error) return bad_usage("page model: expected an error bound below 2^31");
+  if (values.size() > most_palette || std::ranges::adjacent_find(values, std::ranges::greater_equal()) != values.end())
+    return bad_usage("page model: expected at most 65536 values, ascending");
+  if (!values.empty() && values.back() > options.max_sample)
+    return bad_usage("page model: a value above max_sample");
+  for (const Page& page : pages_) {
+    if (!page.extent.valid() || page.samples.size() != static_cast<size_t>(page.extent.voxels()))
+      return bad_usage("page model: a page of another number of samples than its extent");
+    if (*std::ranges::max_element(page.samples) > options.max_sample)
+      return bad_usage("page model: a sample above max_sample");
+  }
+  const auto fitted = [&](const std::vector<uint32_t>& palette) -> Result<Model> {
+    auto made = std::make_shared<ModelData>();
+    made->max_error = options.max_error;
+    made->max_value = palette.empty() ? options.max_sample : static_cast<uint32_t>(palette.size() - 1);
+    made->palette = palette;
+    std::vector<Sampled> pages;
+    for (const Page& page : pages_) {
+      pages.push_back({page.extent, page.samples, {}});
+      if (!number(palette, pages.back().values)) return bad_usage("page model: a sample that is none of the values");
+    }
+    fit(*made, pages);
+    return Model(std::move(made));
+  };
+  VOX_TRY(Model plain, fitted({}));
+  if (values.empty() || options.max_error != 0) return plain;
+  VOX_TRY(Model numbered, fitted(values));
+  VOX_TRY(const size_t plain_size, size_with(plain, pages_));
+  VOX_TRY(const size_t numbered_size, size_with(numbered, pages_));
+  return numbered_size < plain_size ? numbered : plain;
+}
+
+}  // namespace voxkit::page

@@ -1,0 +1,101 @@
+// Pages: boxes of up to 16^3 samples, predicted, quantised within a bound, entropy-coded, each decodable
+// alone with a model that many pages share. Samples are unsigned integers of 8, 16 or 32 bits, x fastest.
+#pragma once
+
+#include <cstddef>
+#include <cstdint>
+#include <memory>
+#include <span>
+#include <vector>
+
+#include "formats/result.h"
+#include "libpage/extent.h"
+
+namespace voxkit::page {
+
+struct ModelData;
+
+/// What the pages of a volume, or of a region of it, are coded with: weights of the prediction, tables of
+/// probabilities, the bound, a palette. Immutable; copies share what they hold; safe to use from many
+/// threads.
+class Model {
+ public:
+  /// Safe on any bytes: a model, or ErrorCode::input that names the field that is wrong.
+  static Result<Model> parse(std::span<const std::byte> bytes);
+  /// The bytes that `parse` takes: 1 to 4 KB as a rule.
+  std::vector<std::byte> serialise() const;
+
+  uint32_t max_error() const;
+  /// The greatest sample that a page of this model can hold.
+  uint32_t max_sample() const;
+  /// What a page of no bytes is full of.
+  uint32_t background() const;
+  /// For the library itself.
+  const ModelData& data() const { return *data_; }
+  explicit Model(std::shared_ptr<const ModelData> data) : data_(std::move(data)) {}
+
+ private:
+  std::shared_ptr<const ModelData> data_;
+};
+
+struct ModelOptions {
+  /// No decoded sample is further from its original than this; 0: all are equal. At most 2^31 - 1.
+  uint32_t max_error = 0;
+  /// The greatest sample that any page will have. Less than a type can hold is a little smaller.
+  uint32_t max_sample = 0xffffffff;
+  /// All values that samples of any page have, ascending, at most 65536 of them; or empty. The model has a
+  /// palette of them where that is smaller, and the bound is 0.
+  std::vector<uint32_t> values;
+};
+
+/// Fits a model to sample pages, or to all of them. Its result depends on these and their order alone: all
+/// sums are integers, or of a fixed order.
+class ModelBuilder {
+ public:
+  /// Keeps a copy of a page: `extent.voxels()` samples.
+  void add(std::span<const uint8_t> samples, Extent extent);
+  void add(std::span<const uint16_t> samples, Extent extent);
+  void add(std::span<const uint32_t> samples, Extent extent);
+  /// Errors: ErrorCode::usage where options contradict each other or the samples.
+  Result<Model> build(const ModelOptions& options) const;
+
+  struct Page {
+    Extent extent;
+    std::vector<uint32_t> samples;
+  };
+
+ private:
+  std::vector<Page> pages_;
+};
+
+/// Appends the bytes of a page to `out`: none where all samples are within the bound of the background. They
+/// depend on nothing but the model and the samples. Errors: ErrorCode::usage for samples that the model
+/// cannot hold, or that are not `extent.voxels()` many.
+Status encode_page(const Model& model, std::span<const uint8_t> samples, Extent extent,
+                   std::vector<std::byte>& out);
+Status encode_page(const Model& model, std::span<const uint16_t> samples, Extent extent,
+                   std::vector<std::byte>& out);
+Status encode_page(const Model& model, std::span<const uint32_t> samples, Extent extent,
+                   std::vector<std::byte>& out);
+
+/// Decodes a page of exactly these bytes into `extent.voxels()` samples. Safe on any bytes: it touches
+/// nothing else, and damage that shows is ErrorCode::input; what was written by then is undefined.
+/// ErrorCode::usage where the type is too narrow for the model, or `out` is not of that size.
+Status decode_page(const Model& model, std::span<const std::byte> page, Extent extent, std::span<uint8_t> out);
+Status decode_page(const Model& model, std::span<const std::byte> page, Extent extent, std::span<uint16_t> out);
+Status decode_page(const Model& model, std::span<const std::byte> page, Extent extent, std::span<uint32_t> out);
+
+/// One of several pages to decode.
+template <class T>
+struct PageJob {
+  std::span<const std::byte> page;
+  Extent extent;
+  std::span<T> out;
+};
+/// As decode_page for each, several side by side, which is faster. The first damaged one in order is named by
+/// `failed`, if given; the others are decoded all the same.
+Status decode_pages(const Model& model, std::span<const PageJob<uint8_t>> jobs, size_t* failed = nullptr);
+Status decode_pages(const Model& model, std::span<const PageJob<uint16_t>> jobs, size_t* failed = nullptr);
+Status decode_pages(const Model& model, std::span<const PageJob<uint32_t>> jobs, size_t* failed = nullptr);
+
+}  // namespace voxkit::page
