@@ -33,20 +33,24 @@ class SpooledSource final : public VolumeSource {
 
 }  // namespace
 
+Result<std::unique_ptr<VolumeSource>> VolumeSpool::finish() {
+  VOX_TRY(auto mapped, file_.map());
+  return std::make_unique<SpooledSource>(info_, std::move(mapped));
+}
+
 Result<std::unique_ptr<VolumeSource>> spooled(std::unique_ptr<VolumeSource> source, Context& ctx) {
   if (!source->forward_only()) return source;
   const VolumeInfo& info = source->info();
   const Slabs slabs(info.box(), voxel_bytes(info.format), slab_target(ctx));
   VOX_TRY(const auto buffer, Buffer::allocate(slabs.bytes(), "a slab of voxels", ctx));
-  TemporaryFile file("the decoded volume");
+  VolumeSpool spool(info);
   for (int64_t i = 0; i < slabs.count(); ++i) {
     VOX_CHECK(check_interrupt());
     const Box slab = slabs.slab(i);
     VOX_CHECK(source->read(slab, packed(buffer->data(), slab.size(), info.format)));
-    VOX_CHECK(file.write({buffer->data(), static_cast<size_t>(slab.voxels() * voxel_bytes(info.format))}));
+    VOX_CHECK(spool.write({buffer->data(), static_cast<size_t>(slab.voxels() * voxel_bytes(info.format))}));
   }
-  VOX_TRY(auto mapped, file.map());
-  return std::make_unique<SpooledSource>(info, std::move(mapped));
+  return spool.finish();
 }
 
 }  // namespace voxkit

@@ -7,6 +7,8 @@
 #include "formats/copy.h"
 #include "formats/full_scale.h"
 #include "formats/output_file.h"
+#include "formats/spool.h"
+#include "libsvmm/packed/packed.h"
 #include "libsvmm/svmm.h"
 #include "tools/common/encoding.h"
 #include "tools/common/retype.h"
@@ -21,7 +23,8 @@ struct Options {
   std::vector<int64_t> blockwidths = {0};
   int64_t rootwidth = 32;
   std::optional<double> quality, delta;
-  std::string base = "raw", layout = "plain", bound, alpha_weight;
+  std::string base = "raw", layout = "plain", bound, alpha_weight, levels = "on", page = "16";
+  std::optional<double> max_error;
   std::optional<ValueRange> range;
   int zstd = 0;
   bool verify = false;
@@ -46,8 +49,18 @@ void declare(CommandLine& line, Options& o) {
               number(o.delta, 0, 1e9));
   line.option("-b,--base", "BASE", "Base level: raw bitmap alpha gray bc1 (raw)",
               one_of(o.base, {"raw", "bitmap", "alpha", "gray", "bc1"}));
-  line.option("--layout", "LAYOUT", "plain, or thesis: the published bits, sizes and stop rule (plain)",
-              one_of(o.layout, {"plain", "thesis"}));
+  line.option("--layout", "LAYOUT",
+              "plain; thesis: the published bits, sizes and stop rule; packed: entropy-coded pages, the "
+              "smallest (plain)",
+              one_of(o.layout, {"plain", "thesis", "packed"}));
+  line.option("--max-error", "E",
+              "Of layout packed, in place of a quality: greatest error, in units of samples",
+              number(o.max_error, 0, 1e300));
+  line.option("--levels", "on|off", "Of layout packed: coarser levels, for views from afar (on)",
+              one_of(o.levels, {"on", "off"}));
+  line.option("--page", "N",
+              "Of layout packed: voxels along a page's side, 16, or 8 for quicker single voxels (16)",
+              one_of(o.page, {"16", "8"}));
   line.option(
       "--bound", "BOUND",
       "global: no voxel is further than delta from the original; local: than from the level below (global)",
@@ -100,11 +113,101 @@ Json json_of(const Encoding& encoding, const Run& run, const svmm::Params& param
   return json;
 }
 
+/// Compares what was written with the source, and says where it is further off than promised: then nothing is
+/// to appear.
+Result<bool> holds(std::unique_ptr<VolumeSource>& source, Inputs& inputs, const OutputFile& out,
+                   const Options& o, double promised, const std::function<bool(const VolumeDiff&)>& kept,
+                   Encoding& encoding, Run& run) {
+  run.stage("verify");
+  if (source->forward_only()) {
+    VOX_TRY(source, inputs.open(true));
+  }
+  VOX_TRY(const Input decoded, open_compressed(out.temporary(), 0, run.ctx));
+  VOX_TRY(encoding.diff, diff_volumes(*source, *decoded.source, std::nullopt, nullptr, run.ctx));
+  if (kept(*encoding.diff)) return true;
+  report(run.tool,
+         {ErrorCode::internal, o.output,
+          fmt::format("verification failed: greatest error {}: expected at most {}; nothing was written",
+                      encoding.diff->max_distance, promised)});
+  return false;
+}
+
+Status check_packed(const Options& o) {
+  if (o.blockwidths != std::vector<int64_t>{0} || o.rootwidth != 32 || o.base != "raw" || !o.bound.empty() ||
+      !o.alpha_weight.empty() || o.zstd != 0)
+    return bad_usage(
+        "--blockwidth, --rootwidth, --base, --bound, --alpha-weight, --zstd: not of --layout packed");
+  if ((o.quality.has_value() + o.delta.has_value() + o.max_error.has_value()) > 1)
+    return bad_usage("--quality, --delta and --max-error: expected one of them");
+  return {};
+}
+
+Result<int> work_packed(const Options& o, Inputs& inputs, Run& run) {
+  VOX_CHECK(check_packed(o));
+  VOX_TRY(auto source, inputs.open(true));
+  const VoxelFormat format = source->info().format;
+  if (is_color(format))
+    return bad_usage(fmt::format("--layout packed: voxels are {}: expected scalars, or layout plain",
+                                 voxkit::name(format)));
+  svmm::PackedOptions options;
+  options.page_side = o.page == "8" ? 8 : 16;
+  options.levels = o.levels == "on";
+  const double delta =
+      o.delta ? *o.delta : svmm::delta_of_quality(o.quality.value_or(90), format, svmm::Layout::plain);
+  const bool lossless = o.max_error ? *o.max_error == 0 : delta == 0;
+  if (!lossless && format == VoxelFormat::float32) {
+    VOX_TRY(const Census census, look_at_floats(source, inputs, o.input, run));
+    options.max_error = o.max_error.value_or(delta * full_scale(source->info(), census.range));
+    if (o.range && !o.max_error) options.max_error = delta * (o.range->hi - o.range->lo);
+  } else if (!lossless && !o.max_error && format == VoxelFormat::density16 && !o.range) {
+    run.stage("measure");
+    VOX_TRY(const ValueRange range, measure_range(*source, run.ctx));
+    if (source->forward_only()) {
+      VOX_TRY(source, inputs.open(true));
+    }
+    options.max_error = delta * full_scale(source->info(), range);
+  } else if (!lossless) {
+    options.max_error = o.max_error.value_or(
+        delta * (o.range ? o.range->hi - o.range->lo : full_scale(source->info(), {0, 1})));
+  }
+  const VolumeInfo info = source->info();
+  run.stage("read");
+  VOX_TRY(source, spooled(std::move(source), run.ctx));
+  VOX_TRY(auto out, OutputFile::create(o.output, run.options.force));
+  run.stage("encode");
+  const double start = run.seconds();
+  VOX_TRY(const svmm::PackedParams params,
+          svmm::encode_packed(
+              *source, options, [&](auto bytes) { return out->write(bytes); }, run.ctx));
+  Encoding encoding{o.input, o.output, info, out->position(), run.seconds() - start, {}};
+  const bool exact =
+      format == VoxelFormat::float32 ? params.map.kind == svmm::CodeKind::ordered : params.max_error < 1;
+  encoding.lossless = exact && !info.rounded;
+  if (o.verify) {
+    const auto kept = [&](const VolumeDiff& diff) {
+      return exact ? diff.differing_voxels == 0 : diff.max_abs_error <= params.max_error;
+    };
+    VOX_TRY(const bool held, holds(source, inputs, *out, o, params.max_error, kept, encoding, run));
+    if (!held) return 1;
+  }
+  VOX_CHECK(out->commit());
+  if (run.options.json) {
+    Json json = encoding_json(encoding, run, params_json(params));
+    add_verified(encoding, json);
+    VOX_CHECK(print(json.text()));
+  }
+  if (!run.options.quiet && !run.options.json) print_encoding(encoding);
+  return 0;
+}
+
 Result<int> work(const Options& o, Run& run) {
   VOX_CHECK(check_encoding(o.input, o.output, o.verify, run));
   OpenOptions open = o.open;
   open.outputs = {o.output};
   Inputs inputs(o.input, open, run.ctx);
+  if (o.layout == "packed") return work_packed(o, inputs, run);
+  if (o.max_error || o.levels != "on" || o.page != "16")
+    return bad_usage("--max-error, --levels, --page: of --layout packed only");
   const bool lossless = o.delta ? *o.delta == 0 : o.quality.value_or(90) == 100;
   VOX_TRY(auto source, inputs.open(o.verify || (!lossless && !o.range)));
   VOX_TRY(svmm::Params params, params_of(o, source->info().format));
@@ -141,19 +244,10 @@ Result<int> work(const Options& o, Run& run) {
                       params.layout == svmm::Layout::plain && !info.rounded;
 
   if (o.verify) {
-    run.stage("verify");
-    if (source->forward_only()) {
-      VOX_TRY(source, inputs.open(true));
-    }
-    VOX_TRY(const Input decoded, open_compressed(out->temporary(), 0, run.ctx));
-    VOX_TRY(encoding.diff, diff_volumes(*source, *decoded.source, std::nullopt, nullptr, run.ctx));
-    if (!keeps_promise(params, *encoding.diff)) {
-      report(run.tool,
-             {ErrorCode::internal, o.output,
-              fmt::format("verification failed: greatest error {}: expected at most {}; nothing was written",
-                          encoding.diff->max_distance, params.delta * params.full_scale)});
-      return 1;
-    }
+    const auto kept = [&](const VolumeDiff& diff) { return keeps_promise(params, diff); };
+    VOX_TRY(const bool held,
+            holds(source, inputs, *out, o, params.delta * params.full_scale, kept, encoding, run));
+    if (!held) return 1;
   }
   VOX_CHECK(out->commit());
   if (run.options.json) VOX_CHECK(print(json_of(encoding, run, params, levels).text()));

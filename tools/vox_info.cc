@@ -31,7 +31,7 @@ void declare(CommandLine& line, Options& o) {
 }
 
 std::string_view format_of(const std::string& file, const Input& input) {
-  if (input.svmm) return "svmm";
+  if (input.svmm || input.packed) return "svmm";
   if (input.vq) return "vqv";
   if (input.color) return "dagc";
   if (is_builtin(file)) return "builtin";
@@ -41,7 +41,7 @@ std::string_view format_of(const std::string& file, const Input& input) {
 }
 
 std::string_view codec_of(const Input& input) {
-  return input.svmm ? "svmm" : input.vq ? "vq" : input.color ? "dagcolor" : "none";
+  return input.svmm || input.packed ? "svmm" : input.vq ? "vq" : input.color ? "dagcolor" : "none";
 }
 std::string letters(uint32_t kind) {
   std::string text;
@@ -51,10 +51,11 @@ std::string letters(uint32_t kind) {
 
 /// The container of a compressed volume; null for others.
 const Container* container_of(const Input& input) {
-  return input.svmm    ? &input.svmm->container()
-         : input.vq    ? &input.vq->container()
-         : input.color ? &input.color->container()
-                       : nullptr;
+  return input.svmm     ? &input.svmm->container()
+         : input.packed ? &input.packed->container()
+         : input.vq     ? &input.vq->container()
+         : input.color  ? &input.color->container()
+                        : nullptr;
 }
 
 Json json_of(const Options& o, const Run& run, const Input& input, std::optional<uint64_t> bytes) {
@@ -94,10 +95,11 @@ Json json_of(const Options& o, const Run& run, const Input& input, std::optional
     for (const std::string& part : info.parts) parts.push(part);
     json.set("parts", std::move(parts));
   }
-  json.set("params", input.svmm    ? params_json(input.svmm->params())
-                     : input.vq    ? params_json(input.vq->params())
-                     : input.color ? params_json(input.color->params())
-                                   : Json::object());
+  json.set("params", input.svmm     ? params_json(input.svmm->params())
+                     : input.packed ? params_json(input.packed->params())
+                     : input.vq     ? params_json(input.vq->params())
+                     : input.color  ? params_json(input.color->params())
+                                    : Json::object());
   Json chunks = Json::array();
   if (const Container* container = container_of(input)) {
     for (const ChunkEntry& entry : container->table()) {
@@ -113,6 +115,7 @@ Json json_of(const Options& o, const Run& run, const Input& input, std::optional
   if (input.svmm) {
     json.set("levels", levels_json(input.svmm->levels()));
   }
+  if (input.packed) json.set("levels", levels_json(input.packed->levels()));
   if (input.vq) add_sizes(input.vq->params(), json);
   if (input.color) add_sizes(input.color->params(), json);
   if (o.check) json.set("checked", true);
@@ -182,6 +185,7 @@ std::string text_of(const Options& o, const Input& input, std::optional<uint64_t
                           l.mip_factor, fmt::format("{} x {} x {}", l.dims.x, l.dims.y, l.dims.z), l.blocks,
                           l.block_bytes, l.terminal_voxels);
   }
+  if (input.packed) text += levels_text(*input.packed);
   if (input.vq) text += sizes_text(*input.vq);
   if (input.color) text += sizes_text(input.color->params());
   if (o.check) text += "check       passed\n";
@@ -210,8 +214,9 @@ Result<int> work(const Options& o, Run& run) {
   if (o.check) {
     run.stage("check");
     NullSink sink;
-    const Status status = input.svmm ? input.svmm->check(run.ctx)
-                          : input.vq ? input.vq->check(run.ctx)
+    const Status status = input.svmm     ? input.svmm->check(run.ctx)
+                          : input.packed ? input.packed->check(run.ctx)
+                          : input.vq     ? input.vq->check(run.ctx)
                           : input.color
                               ? input.color->check(run.ctx)
                               : copy_volume(*input.source, input.source->info().box(), sink, run.ctx);

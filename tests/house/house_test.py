@@ -19,7 +19,9 @@ formats           ->
 formats/image     -> formats
 formats/mesh      -> formats formats/image
 formats/volume    -> formats formats/image
+libpage           -> formats
 libsvmm           -> formats formats/volume
+libsvmm/packed    -> formats libpage libsvmm
 libvq             -> formats formats/volume
 libcolor/surface  -> formats formats/mesh
 libcolor/terrain  -> formats libcolor/surface

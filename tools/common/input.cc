@@ -49,6 +49,12 @@ Result<Input> open_codec(std::shared_ptr<const Container> container, int level, 
     input.source = color::open_source(input.color);
     return input;
   }
+  if (svmm::is_packed(*container)) {
+    VOX_TRY(input.packed, svmm::PackedVolume::open(container, *ctx.memory));
+    VOX_CHECK(check_level(input.packed->params().levels));
+    VOX_TRY(input.source, svmm::open_source(input.packed, level));
+    return input;
+  }
   VOX_TRY(input.svmm, svmm::Volume::open(container));
   VOX_CHECK(check_level(static_cast<int>(input.svmm->levels().size())));
   VOX_TRY(input.source, svmm::open_source(input.svmm, level));

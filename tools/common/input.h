@@ -8,6 +8,7 @@
 
 #include "formats/volume/open_volume.h"
 #include "libcolor/color.h"
+#include "libsvmm/packed/packed.h"
 #include "libsvmm/svmm.h"
 #include "libvq/vq.h"
 #include "tools/common/command_line.h"
@@ -16,9 +17,10 @@ namespace voxkit::cli {
 
 struct Input {
   std::unique_ptr<VolumeSource> source;
-  std::shared_ptr<const svmm::Volume> svmm;    ///< null for all but .svmm
-  std::shared_ptr<const vq::Volume> vq;        ///< null for all but .vqv
-  std::shared_ptr<const color::Volume> color;  ///< null for all but .dagc
+  std::shared_ptr<const svmm::Volume> svmm;          ///< null for all but .svmm of layouts thesis and plain
+  std::shared_ptr<const svmm::PackedVolume> packed;  ///< null for all but .svmm of layout packed
+  std::shared_ptr<const vq::Volume> vq;              ///< null for all but .vqv
+  std::shared_ptr<const color::Volume> color;        ///< null for all but .dagc
 };
 
 /// Declares --dims, --endian, --grid and what else OpenOptions has, and with `type` also --type as the type

@@ -1,5 +1,7 @@
 #include "tools/common/svmm_report.h"
 
+#include <fmt/format.h>
+
 #include <utility>
 
 namespace voxkit::cli {
@@ -38,6 +40,53 @@ Json levels_json(std::span<const svmm::Level> levels) {
     array.push(std::move(json));
   }
   return array;
+}
+
+namespace {
+
+std::string_view name(svmm::CodeKind kind) {
+  return kind == svmm::CodeKind::integers  ? "integers"
+         : kind == svmm::CodeKind::ordered ? "ordered"
+                                           : "steps";
+}
+
+}  // namespace
+
+Json params_json(const svmm::PackedParams& params) {
+  Json json = Json::object();
+  json.set("layout", "packed").set("page", params.page_side).set("levels", params.levels);
+  json.set("max_error", params.max_error).set("codes", name(params.map.kind));
+  return json;
+}
+
+Json levels_json(std::span<const svmm::PackedLevel> levels) {
+  Json array = Json::array();
+  int64_t index = 0;
+  for (const svmm::PackedLevel& level : levels) {
+    Json json = Json::object();
+    json.set("mip_factor", int64_t{1} << index).set("index", index).set("dims", level.dims);
+    json.set("pages", level.pages.x * level.pages.y * level.pages.z).set("page_bytes", level.page_bytes);
+    json.set("end", level.end);
+    array.push(std::move(json));
+    ++index;
+  }
+  return array;
+}
+
+std::string levels_text(const svmm::PackedVolume& volume) {
+  const svmm::PackedParams& p = volume.params();
+  std::string text =
+      fmt::format("params      layout packed, pages of {0} x {0} x {0}, greatest error {1:.6g}\n",
+                  p.page_side, p.max_error);
+  text += "level  factor  dims                     pages        bytes    ends at byte\n";
+  int index = 0;
+  for (const svmm::PackedLevel& l : volume.levels()) {
+    text += fmt::format("{:>5}  {:>6}  {:<18}  {:>10}  {:>11}  {:>14}\n", index, int64_t{1} << index,
+                        fmt::format("{} x {} x {}", l.dims.x, l.dims.y, l.dims.z),
+                        l.pages.x * l.pages.y * l.pages.z, l.page_bytes, l.end);
+    ++index;
+  }
+  return text;
 }
 
 }  // namespace voxkit::cli

@@ -2,8 +2,10 @@
 #pragma once
 
 #include <span>
+#include <string>
 #include <string_view>
 
+#include "libsvmm/packed/packed.h"
 #include "libsvmm/svmm.h"
 #include "tools/common/json.h"
 
@@ -17,5 +19,10 @@ std::string_view name(svmm::Bound bound);
 Json params_json(const svmm::Params& params);
 /// The JSON array `levels`.
 Json levels_json(std::span<const svmm::Level> levels);
+
+// The same of layout packed; levels as lines of vox-info.
+Json params_json(const svmm::PackedParams& params);
+Json levels_json(std::span<const svmm::PackedLevel> levels);
+std::string levels_text(const svmm::PackedVolume& volume);
 
 }  // namespace voxkit::cli

@@ -1,0 +1,93 @@
+// Layout packed: the levels of a volume in pages, each predicted, quantised within a bound and entropy-coded,
+// decodable alone (libpage). File: formats/FORMAT.md, section 2.6.
+//
+// Level 0 is the volume; each voxel of level l + 1 stands for 2^3 voxels of level l: their mean, without
+// those that stand for nothing measured; of labels the commonest. The last level fits into one page.
+#pragma once
+
+#include <memory>
+#include <optional>
+#include <vector>
+
+#include "formats/container.h"
+#include "formats/context.h"
+#include "formats/source.h"
+#include "libsvmm/packed/value_map.h"
+
+namespace voxkit::svmm {
+
+struct PackedOptions {
+  /// No decoded voxel of level 0 is further from its original than this, nor one of another level from the
+  /// mean it stands for; in units of samples. 0: all are equal.
+  double max_error = 0;
+  bool levels = true;  ///< whether there are levels above 0
+  int page_side = 16;  ///< 16 or 8 voxels
+};
+
+/// What a file says about itself.
+struct PackedParams {
+  int page_side = 16;
+  ValueMap map;          ///< from voxels to the samples that pages hold
+  double max_error = 0;  ///< promised; for the reader's information
+  int levels = 1;
+};
+
+/// A level of an opened file.
+struct PackedLevel {
+  Index3 dims{0};           ///< voxels
+  Index3 pages{0};          ///< along each axis
+  uint64_t page_bytes = 0;  ///< of all pages with their index
+  uint64_t model_bytes = 0;
+  uint64_t end = 0;  ///< offset in the file behind the last of its chunks
+};
+
+/// Compresses `source`, scalars of any format, into a container written to `sink`. Two passes over a source
+/// of random access, of which each page is encoded alone; one that is forward-only must have been spooled
+/// (formats/spool.h). Coarser levels go through temporary files of a seventh of the raw bytes ($TMPDIR).
+/// Memory: some MB a thread, and a slab of 32 slices. Bytes do not depend on ctx.threads. Errors:
+/// - ErrorCode::usage: colours; options outside their ranges; a bound that is not finite; a bound for labels.
+/// - ErrorCode::limit: more memory than ctx.memory allows. ErrorCode::output: no room for temporary files.
+/// - ErrorCode::interrupted. Those of `source` and of `sink`.
+Result<PackedParams> encode_packed(VolumeSource& source, const PackedOptions& options, const ByteSink& sink,
+                                   Context& ctx);
+
+/// Whether a container of Codec::svmm is of this layout.
+bool is_packed(const Container& container);
+
+/// A file of this layout, opened for random access. Safe on any bytes. All const functions are thread-safe.
+class PackedVolume {
+ public:
+  /// `memory`, which must outlive it, counts decoded pages that are kept. Errors: ErrorCode::input.
+  static Result<std::shared_ptr<const PackedVolume>> open(std::shared_ptr<const Container> container,
+                                                          MemoryBudget& memory);
+  ~PackedVolume();
+  const VolumeInfo& info() const { return info_; }
+  const PackedParams& params() const { return params_; }
+  const std::vector<PackedLevel>& levels() const { return levels_; }
+  const Container& container() const { return *container_; }
+
+  /// Decodes `box`, in voxels of `level` and inside its dims: only the pages that it touches.
+  Status decode(const Box& box, int level, VoxelSpan out) const;
+  /// One voxel, through a cache of decoded pages.
+  Result<Voxel> sample(Index3 voxel, int level = 0) const;
+  /// The value of the box where its pages take no bytes; nothing where that takes decoding.
+  std::optional<Voxel> uniform(const Box& box, int level) const;
+  /// Verifies every checksum and decodes every page. Errors name level and page.
+  Status check(Context& ctx) const;
+  /// Pages that were decoded so far.
+  uint64_t pages_decoded() const;
+
+ private:
+  struct Pages;
+  PackedVolume();
+  std::shared_ptr<const Container> container_;
+  VolumeInfo info_;
+  PackedParams params_;
+  std::vector<PackedLevel> levels_;
+  std::unique_ptr<Pages> pages_;
+};
+
+/// A level of a file as a source; info() has that level's dims and place.
+Result<std::unique_ptr<VolumeSource>> open_source(std::shared_ptr<const PackedVolume> volume, int level);
+
+}  // namespace voxkit::svmm

@@ -1,0 +1,243 @@
+// The encoder: a pass that surveys values and makes the coarser levels, then each level, the coarsest first,
+// page by page.
+#include <fmt/format.h>
+
+#include <cmath>
+
+#include "formats/copy.h"
+#include "formats/parallel.h"
+#include "formats/reservation.h"
+#include "formats/volume_chunks.h"
+#include "libpage/page.h"
+#include "libsvmm/packed/halve.h"
+#include "libsvmm/packed/packed_layout.h"
+#include "libsvmm/packed/survey.h"
+
+namespace voxkit::svmm {
+namespace {
+
+/// Pages that a model is fitted to.
+constexpr uint64_t most_samples = 512;
+
+/// Reads pages of a level as codes.
+class PageReader {
+ public:
+  PageReader(VolumeSource& source, const PageGrid& grid, const PackedParams& params)
+      : source_(source), grid_(grid), params_(params) {}
+
+  /// Reads the pages `first` to `last`, which are in one row, and calls take(number, codes, extent) for each.
+  template <class Take>
+  Status read(uint64_t first, uint64_t last, const Take& take) {
+    const Box row{grid_.box(first).lo, grid_.box(last - 1).hi};
+    const VoxelFormat format = source_.info().format;
+    voxels_.resize(static_cast<size_t>(row.voxels() * voxel_bytes(format)));
+    const VoxelSpan span = packed(voxels_.data(), row.size(), format);
+    if (const auto value = source_.uniform(row))
+      fill(span, row.size(), format, *value);
+    else
+      VOX_CHECK(source_.read(row, span));
+    for (uint64_t number = first; number < last; ++number) {
+      const Box box = grid_.box(number);
+      const ConstVoxelSpan at{span.data + (box.lo.x - row.lo.x) * voxel_bytes(format), span.row_stride,
+                              span.slice_stride};
+      VOX_CHECK(format == VoxelFormat::float32     ? codes_of_floats(at, box.size(), number, take)
+                : format == VoxelFormat::density16 ? codes_of<uint16_t>(at, box.size(), number, take)
+                                                   : codes_of<uint8_t>(at, box.size(), number, take));
+    }
+    return {};
+  }
+
+ private:
+  template <class T, class Take>
+  Status codes_of(ConstVoxelSpan in, Index3 size, uint64_t number, const Take& take) {
+    T codes[page::max_voxels];
+    T* out = codes;
+    for (int64_t z = 0; z < size.z; ++z)
+      for (int64_t y = 0; y < size.y; ++y, out += size.x)
+        std::memcpy(out, in.row(y, z), static_cast<size_t>(size.x) * sizeof(T));
+    return take(number, std::span<const T>(codes, out), grid_.extent(number));
+  }
+  template <class Take>
+  Status codes_of_floats(ConstVoxelSpan in, Index3 size, uint64_t number, const Take& take) {
+    uint32_t codes[page::max_voxels];
+    uint32_t* out = codes;
+    for (int64_t z = 0; z < size.z; ++z)
+      for (int64_t y = 0; y < size.y; ++y) {
+        const auto* const row = reinterpret_cast<const float*>(in.row(y, z));
+        for (int64_t x = 0; x < size.x; ++x) {
+          *out = params_.map.code(row[x]);
+          if (params_.map.kind == CodeKind::steps && std::isfinite(row[x]) &&
+              !(std::abs(static_cast<double>(params_.map.value(*out)) - static_cast<double>(row[x])) <=
+                params_.max_error))
+            return fail(ErrorCode::internal, {}, "a step further than the bound");
+          ++out;
+        }
+      }
+    return take(number, std::span<const uint32_t>(codes, out), grid_.extent(number));
+  }
+
+  VolumeSource& source_;
+  const PageGrid& grid_;
+  const PackedParams& params_;
+  std::vector<std::byte> voxels_;
+};
+
+/// Runs of pages [first, last) that are in one row.
+std::vector<std::pair<uint64_t, uint64_t>> runs_of(const PageGrid& grid, uint64_t first, uint64_t last) {
+  std::vector<std::pair<uint64_t, uint64_t>> runs;
+  const auto row = static_cast<uint64_t>(grid.count.x);
+  constexpr uint64_t longest = 32;
+  while (first < last) {
+    const uint64_t end = std::min({last, (first / row + 1) * row, first + longest});
+    runs.emplace_back(first, end);
+    first = end;
+  }
+  return runs;
+}
+
+class Encoder {
+ public:
+  Encoder(VolumeSource& source, const PackedOptions& options, const ByteSink& sink, Context& ctx)
+      : source_(source),
+        info_(source.info()),
+        ctx_(ctx),
+        survey_(info_.format),
+        container_(sink, Codec::svmm, container_version_for(info_)) {
+    params_.page_side = options.page_side;
+    params_.max_error = options.max_error;
+    params_.levels = options.levels ? level_count(info_.dims, options.page_side) : 1;
+  }
+
+  Result<PackedParams> run() {
+    VOX_CHECK(prepare());
+    VOX_CHECK(add_volume_info(container_, info_));
+    VOX_CHECK(container_.add(packed_kind, 0, 0, pack_params(params_)));
+    // The model of coarser levels is fitted to the largest of them.
+    std::optional<page::Model> coarse;
+    if (params_.levels > 1) {
+      VOX_TRY(coarse, fit(1));
+      VOX_CHECK(container_.add(model_kind, 1, 0, coarse->serialise()));
+    }
+    for (int level = params_.levels - 1; level > 0; --level) VOX_CHECK(encode(level, *coarse));
+    VOX_TRY(const page::Model fine, fit(0));
+    VOX_CHECK(container_.add(model_kind, 0, 0, fine.serialise()));
+    VOX_CHECK(encode(0, fine));
+    VOX_CHECK(container_.finish());
+    return params_;
+  }
+
+ private:
+  VolumeSource& source(int level) { return level == 0 ? source_ : *coarser_[static_cast<size_t>(level - 1)]; }
+  PageGrid grid(int level) { return {source(level).info().dims, params_.page_side}; }
+
+  /// The first pass.
+  Status prepare() {
+    const auto look = [&](ConstVoxelSpan voxels, Index3 size) { survey_.look(voxels, size); };
+    if (params_.levels == 1) {
+      VOX_CHECK(visit_voxels(source_, look, ctx_));
+    } else {
+      for (int level = 1; level < params_.levels; ++level) {
+        const auto visit = level == 1 ? std::function<void(ConstVoxelSpan, Index3)>(look) : nullptr;
+        VOX_TRY(auto next, halved(source(level - 1), visit, ctx_));
+        coarser_.push_back(std::move(next));
+      }
+    }
+    if (info_.format == VoxelFormat::float32) {
+      params_.map = ValueMap::for_floats(survey_.range(), params_.max_error);
+      if (params_.map.kind == CodeKind::ordered) params_.max_error = 0;
+    }
+    return {};
+  }
+
+  Result<page::Model> fit(int level) {
+    const PageGrid pages = grid(level);
+    const uint64_t count = std::min(pages.pages(), most_samples);
+    page::ModelBuilder builder;
+    PageReader reader(source(level), pages, params_);
+    VOX_TRY(const Reservation memory,
+            Reservation::take(count * page::max_voxels * sizeof(uint32_t), "pages to fit a model to", ctx_));
+    for (uint64_t i = 0; i < count; ++i) {
+      // Spread evenly: count times pages is below 2^63.
+      const uint64_t number = (2 * i + 1) * pages.pages() / (2 * count);
+      VOX_CHECK(reader.read(number, number + 1, [&](uint64_t, auto codes, page::Extent extent) -> Status {
+        builder.add(codes, extent);
+        return {};
+      }));
+    }
+    page::ModelOptions options;
+    if (info_.format == VoxelFormat::float32) {
+      options.max_sample = params_.map.kind == CodeKind::steps
+                               ? params_.map.code(static_cast<float>(survey_.range().hi))
+                               : 0xffffffff;
+    } else {
+      options.max_error = static_cast<uint32_t>(params_.max_error);
+      const auto values = survey_.values();
+      options.max_sample = values.empty() ? 0 : values.back();
+      // Means of voxels may be other values.
+      const bool same_values = level == 0 || info_.is_labels || info_.format == VoxelFormat::bitmap;
+      if (options.max_error == 0 && same_values) options.values = values;
+    }
+    return builder.build(options);
+  }
+
+  Status encode(int level, const page::Model& model) {
+    const PageGrid pages = grid(level);
+    const auto batch_parts = static_cast<uint64_t>(2 * ctx_.threads);
+    for (uint64_t part = 0; part < pages.parts(); part += batch_parts) {
+      const uint64_t end_part = std::min(part + batch_parts, pages.parts()),
+                     first = part * pages.pages_a_part(),
+                     last = std::min(end_part * pages.pages_a_part(), pages.pages());
+      std::vector<std::vector<std::byte>> encoded(last - first);
+      const auto runs = runs_of(pages, first, last);
+      VOX_CHECK(parallel_for(ctx_, static_cast<int64_t>(runs.size()), [&](int64_t i) -> Status {
+        PageReader reader(source(level), pages, params_);
+        const auto [begin, end] = runs[static_cast<size_t>(i)];
+        return reader.read(begin, end, [&](uint64_t number, auto codes, page::Extent extent) {
+          return page::encode_page(model, codes, extent, encoded[number - first]);
+        });
+      }));
+      std::span<const std::vector<std::byte>> left = encoded;
+      for (uint64_t p = part; p < end_part; ++p) {
+        const uint64_t count = pages.pages_of(p);
+        VOX_CHECK(container_.add(pages_kind, static_cast<uint32_t>(level), p, pack_part(left.first(count))));
+        left = left.subspan(count);
+      }
+      source(level).release(pages.box(first).lo.z, pages.box(last - 1).lo.z);
+      if (level == 0) ctx_.progress(static_cast<double>(last) / static_cast<double>(pages.pages()));
+    }
+    return {};
+  }
+
+  VolumeSource& source_;
+  const VolumeInfo info_;
+  Context& ctx_;
+  PackedParams params_;
+  Survey survey_;
+  std::vector<std::unique_ptr<VolumeSource>> coarser_;
+  ContainerWriter container_;
+};
+
+}  // namespace
+
+Result<PackedParams> encode_packed(VolumeSource& source, const PackedOptions& options, const ByteSink& sink,
+                                   Context& ctx) {
+  const VolumeInfo& info = source.info();
+  if (is_color(info.format))
+    return bad_usage(
+        fmt::format("--layout packed: voxels are {}: expected scalars, or layout plain", name(info.format)));
+  if (options.page_side != 8 && options.page_side != 16)
+    return bad_usage(fmt::format("pages of {} voxels: expected 8 or 16", options.page_side));
+  if (!(options.max_error >= 0 && options.max_error <= 1e300))
+    return bad_usage(fmt::format("--max-error {}: expected a finite bound, 0 or more", options.max_error));
+  const bool floats = info.format == VoxelFormat::float32;
+  if (options.max_error >= (floats ? 1e300 : 0x1p31))
+    return bad_usage(fmt::format("--max-error {}: expected less than 2^31", options.max_error));
+  if (options.max_error > 0 && (info.is_labels || info.labels))
+    return bad_usage("--max-error: labels have no values between them: expected 0");
+  if (options.max_error >= 1 && info.fill && !floats)
+    return bad_usage("--max-error: integers with a fill value: expected 0, so that it comes back as it is");
+  if (source.forward_only()) return fail(ErrorCode::internal, {}, "a source that was not spooled");
+  return Encoder(source, options, sink, ctx).run();
+}
+
+}  // namespace voxkit::svmm

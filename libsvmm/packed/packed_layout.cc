@@ -1,0 +1,117 @@
+#include "libsvmm/packed/packed_layout.h"
+
+#include <fmt/format.h>
+
+#include <bit>
+#include <cmath>
+#include <cstring>
+
+#include "formats/little_endian.h"
+
+namespace voxkit::svmm {
+namespace {
+
+constexpr size_t params_bytes = 64;
+constexpr uint32_t most_length_bits = 24;
+
+}  // namespace
+
+int level_count(Index3 dims, int page_side) {
+  int count = 1;
+  while (std::max({dims.x, dims.y, dims.z}) > page_side) {
+    dims = level_dims(dims, 1);
+    ++count;
+  }
+  return count;
+}
+
+std::vector<std::byte> pack_params(const PackedParams& p) {
+  std::vector<std::byte> bytes(params_bytes);
+  bytes[0] = static_cast<std::byte>(std::countr_zero(static_cast<unsigned>(p.page_side)));
+  bytes[1] = static_cast<std::byte>(p.levels);
+  bytes[2] = static_cast<std::byte>(p.map.kind);
+  store_le(&bytes[8], p.map.lo);
+  store_le(&bytes[16], p.map.step);
+  store_le(&bytes[24], p.max_error);
+  return bytes;
+}
+
+Result<PackedParams> unpack_packed_params(std::span<const std::byte> bytes, const VolumeInfo& info,
+                                          const std::string& file) {
+  const auto bad = [&](size_t at, const std::string& what) {
+    return bad_input(file, fmt::format("chunk PAKP, byte {}: {}", at, what));
+  };
+  if (bytes.size() != params_bytes) return bad(bytes.size(), "ends here: expected 64 bytes");
+  PackedParams p;
+  const int log2_side = std::to_integer<int>(bytes[0]);
+  if (log2_side != 3 && log2_side != 4)
+    return bad(0, fmt::format("pages of 2^{}: expected 3 or 4", log2_side));
+  p.page_side = 1 << log2_side;
+  p.levels = std::to_integer<int>(bytes[1]);
+  const int most = level_count(info.dims, p.page_side);
+  if (p.levels != 1 && p.levels != most)
+    return bad(1, fmt::format("{} levels: expected 1 or {}", p.levels, most));
+  const auto kind = std::to_integer<uint8_t>(bytes[2]);
+  if (is_color(info.format))
+    return bad_input(file, fmt::format("chunk VOLI: voxel format {}: expected scalars", name(info.format)));
+  const bool floats = info.format == VoxelFormat::float32;
+  if (floats ? kind != 2 && kind != 3 : kind != 1)
+    return bad(2, fmt::format("unknown kind of codes {}", kind));
+  p.map.kind = static_cast<CodeKind>(kind);
+  p.map.lo = load_le<double>(&bytes[8]);
+  p.map.step = load_le<double>(&bytes[16]);
+  p.max_error = load_le<double>(&bytes[24]);
+  if (p.map.kind == CodeKind::steps &&
+      !(std::isfinite(p.map.lo) && std::isfinite(p.map.step) && p.map.step > 0))
+    return bad(8, "steps that are no finite numbers");
+  return p;
+}
+
+std::vector<std::byte> pack_part(std::span<const std::vector<std::byte>> pages) {
+  size_t longest = 0, total = 0;
+  for (const auto& page : pages) {
+    longest = std::max(longest, page.size());
+    total += page.size();
+  }
+  const auto bits = static_cast<uint32_t>(std::bit_width(longest));
+  std::vector<std::byte> bytes(1 + (pages.size() * bits + 7) / 8);
+  bytes[0] = static_cast<std::byte>(bits);
+  bytes.reserve(bytes.size() + total);
+  for (size_t i = 0; i < pages.size(); ++i)
+    for (uint32_t b = 0; b < bits; ++b)
+      if (pages[i].size() >> b & 1) {
+        const size_t at = i * bits + b;
+        bytes[1 + at / 8] |= static_cast<std::byte>(1u << at % 8);
+      }
+  for (const auto& page : pages) bytes.insert(bytes.end(), page.begin(), page.end());
+  return bytes;
+}
+
+PartView::PartView(std::span<const std::byte> bytes, uint64_t pages) : bytes_(bytes), pages_(pages) {
+  if (bytes.empty()) return;
+  bits_ = std::to_integer<uint32_t>(bytes[0]);
+  head_ = 1 + (pages * bits_ + 7) / 8;
+}
+
+uint64_t PartView::length(uint64_t number) const {
+  const uint64_t at = number * bits_;
+  uint64_t word = 0;
+  std::memcpy(&word, &bytes_[1 + at / 8], std::min<size_t>(8, head_ - 1 - at / 8));
+  return word >> at % 8 & ((uint64_t{1} << bits_) - 1);
+}
+
+bool PartView::valid() const {
+  if (head_ == 0 || bits_ > most_length_bits || head_ > bytes_.size()) return false;
+  uint64_t total = 0;
+  for (uint64_t i = 0; i < pages_ && bits_ > 0; ++i) total += length(i);
+  return head_ + total == bytes_.size();
+}
+
+std::span<const std::byte> PartView::page(uint64_t number) const {
+  if (bits_ == 0) return {};
+  uint64_t at = head_;
+  for (uint64_t i = 0; i < number; ++i) at += length(i);
+  return bytes_.subspan(at, length(number));
+}
+
+}  // namespace voxkit::svmm

@@ -1,0 +1,85 @@
+// The chunks of layout packed (FORMAT.md, section 2.6): parameters, models, and parts, which hold runs of
+// pages behind their lengths.
+#pragma once
+
+#include <algorithm>
+#include <span>
+#include <string>
+#include <vector>
+
+#include "formats/container.h"
+#include "libpage/extent.h"
+#include "libsvmm/packed/packed.h"
+
+namespace voxkit::svmm {
+
+inline constexpr uint32_t packed_kind = chunk_kind("PAKP");
+inline constexpr uint32_t model_kind = chunk_kind("MODL");  ///< index: level
+inline constexpr uint32_t pages_kind = chunk_kind("PAGE");  ///< index: level; part: run of pages
+
+/// Level 31 of the longest side is one voxel.
+inline constexpr int max_packed_levels = 32;
+
+inline Index3 level_dims(Index3 dims, int level) {
+  const int64_t factor = int64_t{1} << level;
+  return (dims + (factor - 1)) / factor;
+}
+/// Levels of a volume, down to one that fits into a page.
+int level_count(Index3 dims, int page_side);
+
+/// The pages of a level, in raster order, x fastest.
+struct PageGrid {
+  PageGrid() = default;
+  PageGrid(Index3 level_dims, int page_side)
+      : dims(level_dims),
+        side(page_side),
+        count((level_dims + int64_t{page_side - 1}) / int64_t{page_side}) {}
+  Index3 dims{0};
+  int64_t side = 16;
+  Index3 count{0};
+  uint64_t pages() const { return static_cast<uint64_t>(count.x * count.y * count.z); }
+  uint64_t number(Index3 page) const {
+    return static_cast<uint64_t>((page.z * count.y + page.y) * count.x + page.x);
+  }
+  Box box(uint64_t number) const {
+    const auto n = static_cast<int64_t>(number);
+    const Index3 lo = Index3(n % count.x, n / count.x % count.y, n / (count.x * count.y)) * side;
+    return {lo, glm::min(lo + side, dims)};
+  }
+  page::Extent extent(uint64_t number) const {
+    const Index3 size = box(number).size();
+    return {static_cast<int>(size.x), static_cast<int>(size.y), static_cast<int>(size.z)};
+  }
+  /// Pages of a part: 2^19 voxels.
+  uint64_t pages_a_part() const { return (uint64_t{1} << 19) / static_cast<uint64_t>(side * side * side); }
+  uint64_t parts() const { return (pages() + pages_a_part() - 1) / pages_a_part(); }
+  uint64_t pages_of(uint64_t part) const { return std::min(pages_a_part(), pages() - part * pages_a_part()); }
+};
+
+std::vector<std::byte> pack_params(const PackedParams& params);
+/// Errors: ErrorCode::input, naming `file`.
+Result<PackedParams> unpack_packed_params(std::span<const std::byte> bytes, const VolumeInfo& info,
+                                          const std::string& file);
+
+/// A part: a byte that says how many bits a length has, the lengths of its pages, each in so many bits,
+/// lowest first, zero bits up to a whole byte, and the pages.
+std::vector<std::byte> pack_part(std::span<const std::vector<std::byte>> pages);
+
+/// The pages of a part, by their lengths. Safe on any bytes.
+class PartView {
+ public:
+  PartView(std::span<const std::byte> bytes, uint64_t pages);
+  /// Whether the lengths are there, and add up to the bytes behind them.
+  bool valid() const;
+  /// Of a valid one.
+  std::span<const std::byte> page(uint64_t number) const;
+
+ private:
+  uint64_t length(uint64_t number) const;
+  std::span<const std::byte> bytes_;
+  uint64_t pages_;
+  uint32_t bits_ = 0;
+  uint64_t head_ = 0;  ///< bytes before the pages
+};
+
+}  // namespace voxkit::svmm

@@ -1,0 +1,291 @@
+#include <fmt/format.h>
+
+#include <atomic>
+#include <cstring>
+
+#include "formats/parallel.h"
+#include "formats/volume_chunks.h"
+#include "libpage/page.h"
+#include "libsvmm/packed/packed_layout.h"
+#include "libsvmm/packed/page_cache.h"
+
+namespace voxkit::svmm {
+namespace {
+
+/// Pages that are decoded side by side.
+constexpr size_t most_jobs = 8;
+
+}  // namespace
+
+struct PackedVolume::Pages {
+  struct Level {
+    PageGrid grid;
+    std::vector<size_t> chunks;  ///< by part: index into the container's table
+    /// Parts whose lengths were found to be right.
+    std::unique_ptr<std::atomic<bool>[]> checked;
+    const page::Model* model = nullptr;
+  };
+  explicit Pages(MemoryBudget& memory) : cache(memory) {}
+
+  std::vector<Level> levels;
+  std::vector<page::Model> models;  ///< of level 0, and of those above
+  mutable PageCache cache;
+  mutable std::atomic<uint64_t> decoded{0};
+
+  /// The pages of a part; ErrorCode::input where it is damaged.
+  Result<PartView> part(const Container& container, int level, uint64_t number) const {
+    const Level& l = levels[static_cast<size_t>(level)];
+    VOX_TRY(const auto bytes, container.chunk(l.chunks[number]));
+    const PartView view(bytes, l.grid.pages_of(number));
+    if (!l.checked[number].load(std::memory_order_acquire)) {
+      if (!view.valid())
+        return bad_input(container.name(),
+                         fmt::format("chunk PAGE {}.{}: lengths of pages that do not add up", level, number));
+      l.checked[number].store(true, std::memory_order_release);
+    }
+    return view;
+  }
+  Result<std::span<const std::byte>> page(const Container& container, int level, uint64_t number) const {
+    const uint64_t a_part = levels[static_cast<size_t>(level)].grid.pages_a_part();
+    VOX_TRY(const PartView view, part(container, level, number / a_part));
+    return view.page(number % a_part);
+  }
+};
+
+namespace {
+
+Error at_page(const Container& container, int level, uint64_t number, const PageGrid& grid,
+              const Error& error) {
+  const Index3 lo = grid.box(number).lo;
+  return {ErrorCode::input, container.name(),
+          fmt::format("level {}, page at {},{},{}: {}", level, lo.x, lo.y, lo.z, error.what)};
+}
+
+/// Puts the codes of a page where its voxels go, as far as they are in `box`; `out` is at the box's corner.
+template <class T>
+void place(const T* codes, const Box& page, const Box& box, const ValueMap& map, VoxelFormat format,
+           VoxelSpan out) {
+  const Box part = intersect(page, box);
+  const Index3 size = page.size();
+  for (int64_t z = part.lo.z; z < part.hi.z; ++z)
+    for (int64_t y = part.lo.y; y < part.hi.y; ++y) {
+      const T* const from =
+          codes + ((z - page.lo.z) * size.y + (y - page.lo.y)) * size.x + (part.lo.x - page.lo.x);
+      std::byte* const to =
+          out.row(y - box.lo.y, z - box.lo.z) + (part.lo.x - box.lo.x) * voxel_bytes(format);
+      const auto count = static_cast<size_t>(part.hi.x - part.lo.x);
+      if constexpr (sizeof(T) < 4) {
+        std::memcpy(to, from, count * sizeof(T));
+      } else {
+        auto* const floats = reinterpret_cast<float*>(to);
+        for (size_t x = 0; x < count; ++x) floats[x] = map.value(from[x]);
+      }
+    }
+}
+
+}  // namespace
+
+bool is_packed(const Container& container) {
+  return container.codec() == Codec::svmm && container.has_chunk(packed_kind);
+}
+
+PackedVolume::PackedVolume() = default;
+PackedVolume::~PackedVolume() = default;
+
+Result<std::shared_ptr<const PackedVolume>> PackedVolume::open(std::shared_ptr<const Container> container,
+                                                               MemoryBudget& memory) {
+  const auto bad = [&](const std::string& what) { return bad_input(container->name(), what); };
+  const std::shared_ptr<PackedVolume> volume(new PackedVolume);
+  VOX_TRY(volume->info_, read_volume_info(*container));
+  VOX_TRY(const auto bytes, container->only_chunk(packed_kind));
+  VOX_TRY(volume->params_, unpack_packed_params(bytes, volume->info_, container->name()));
+  const int levels = volume->params_.levels;
+  volume->pages_ = std::make_unique<Pages>(memory);
+  Pages& pages = *volume->pages_;
+  const auto& table = container->table();
+  constexpr size_t none = ~size_t{0};
+  for (int i = 0; i < levels; ++i) {
+    Pages::Level level;
+    level.grid = PageGrid(level_dims(volume->info_.dims, i), volume->params_.page_side);
+    if (level.grid.parts() > table.size())
+      return bad(fmt::format("fewer chunks PAGE than the {} of level {}", level.grid.parts(), i));
+    level.chunks.assign(level.grid.parts(), none);
+    level.checked = std::make_unique<std::atomic<bool>[]>(level.grid.parts());
+    volume->levels_.push_back({level.grid.dims, level.grid.count, 0, 0, 0});
+    pages.levels.push_back(std::move(level));
+  }
+  std::array<size_t, 2> models{none, none};
+  for (size_t i = 0; i < table.size(); ++i) {
+    const ChunkEntry& entry = table[i];
+    if (entry.kind != pages_kind && entry.kind != model_kind) continue;
+    size_t* slot = nullptr;
+    if (entry.kind == model_kind && entry.part == 0 && entry.index < std::min(levels, 2))
+      slot = &models[entry.index];
+    if (entry.kind == pages_kind && entry.index < static_cast<uint32_t>(levels) &&
+        entry.part < pages.levels[entry.index].chunks.size())
+      slot = &pages.levels[entry.index].chunks[entry.part];
+    if (slot == nullptr || *slot != none)
+      return bad(fmt::format("table: chunk {} {}.{}: not expected, or twice",
+                             entry.kind == pages_kind ? "PAGE" : "MODL", entry.index, entry.part));
+    *slot = i;
+    PackedLevel& level = volume->levels_[entry.index];
+    (entry.kind == pages_kind ? level.page_bytes : level.model_bytes) += entry.length;
+    level.end = std::max(level.end, entry.offset + entry.stored);
+  }
+  for (size_t i = 0; i < pages.levels.size(); ++i)
+    for (size_t part = 0; part < pages.levels[i].chunks.size(); ++part)
+      if (pages.levels[i].chunks[part] == none) return bad(fmt::format("no chunk PAGE {}.{}", i, part));
+  for (size_t i = 0; i < static_cast<size_t>(std::min(levels, 2)); ++i) {
+    if (models[i] == none) return bad(fmt::format("no chunk MODL {}.0", i));
+    VOX_TRY(const auto model_bytes, container->chunk(models[i]));
+    auto model = page::Model::parse(model_bytes);
+    if (!model) return bad(fmt::format("chunk MODL {}.0: {}", i, model.error().what));
+    const uint64_t most = volume->info_.format == VoxelFormat::bitmap
+                              ? 1
+                              : (uint64_t{1} << 8 * code_bytes(volume->info_.format)) - 1;
+    if (model->max_sample() > most)
+      return bad(fmt::format("chunk MODL {}.0: samples up to {}: expected at most {}", i, model->max_sample(),
+                             most));
+    pages.models.push_back(std::move(*model));
+  }
+  for (size_t i = 0; i < pages.levels.size(); ++i)
+    pages.levels[i].model = &pages.models[std::min<size_t>(i, 1)];
+  volume->container_ = std::move(container);
+  return std::shared_ptr<const PackedVolume>(volume);
+}
+
+template <class T>
+Status decode_box(const Container& container, const PackedVolume& volume, const auto& pages, const Box& box,
+                  int level, VoxelSpan out) {
+  const auto& l = pages.levels[static_cast<size_t>(level)];
+  const PageGrid& grid = l.grid;
+  const Index3 first = box.lo / grid.side, last = (box.hi + (grid.side - 1)) / grid.side;
+  std::vector<T> buffer(most_jobs * page::max_voxels);
+  std::array<page::PageJob<T>, most_jobs> jobs;
+  std::array<uint64_t, most_jobs> numbers;
+  size_t waiting = 0;
+  const auto flush = [&]() -> Status {
+    size_t failed = 0;
+    const auto batch = std::span<const page::PageJob<T>>(jobs).first(waiting);
+    if (const Status status = page::decode_pages(*l.model, batch, &failed); !status)
+      return tl::unexpected<Error>(at_page(container, level, numbers[failed], grid, status.error()));
+    for (size_t i = 0; i < waiting; ++i)
+      place(jobs[i].out.data(), grid.box(numbers[i]), box, volume.params().map, volume.info().format, out);
+    pages.decoded += waiting;
+    waiting = 0;
+    return {};
+  };
+  for (int64_t z = first.z; z < last.z; ++z)
+    for (int64_t y = first.y; y < last.y; ++y)
+      for (int64_t x = first.x; x < last.x; ++x) {
+        const uint64_t number = grid.number({x, y, z});
+        VOX_TRY(const auto bytes, pages.page(container, level, number));
+        const page::Extent extent = grid.extent(number);
+        numbers[waiting] = number;
+        jobs[waiting] = {
+            bytes, extent,
+            std::span(buffer).subspan(waiting * page::max_voxels, static_cast<size_t>(extent.voxels()))};
+        if (++waiting == most_jobs) VOX_CHECK(flush());
+      }
+  return waiting > 0 ? flush() : Status();
+}
+
+Status PackedVolume::decode(const Box& box, int level, VoxelSpan out) const {
+  if (box.empty()) return {};
+  switch (code_bytes(info_.format)) {
+    case 4:
+      return decode_box<uint32_t>(*container_, *this, *pages_, box, level, out);
+    case 2:
+      return decode_box<uint16_t>(*container_, *this, *pages_, box, level, out);
+    default:
+      return decode_box<uint8_t>(*container_, *this, *pages_, box, level, out);
+  }
+}
+
+Result<Voxel> PackedVolume::sample(Index3 voxel, int level) const {
+  const PageGrid& grid = pages_->levels[static_cast<size_t>(level)].grid;
+  const PageCache::Key key{level, grid.number(voxel / grid.side)};
+  const Box box = grid.box(key.number);
+  const int bytes = voxel_bytes(info_.format);
+  auto page = pages_->cache.find(key);
+  if (!page) {
+    auto made = std::make_shared<PageCache::Page>(static_cast<size_t>(box.voxels() * bytes));
+    VOX_CHECK(decode(box, level, packed(made->data(), box.size(), info_.format)));
+    page = std::move(made);
+    pages_->cache.keep(key, page);
+  }
+  const Index3 at = voxel - box.lo, size = box.size();
+  Voxel out;
+  std::memcpy(out.bytes.data(), page->data() + ((at.z * size.y + at.y) * size.x + at.x) * bytes,
+              static_cast<size_t>(bytes));
+  return out;
+}
+
+std::optional<Voxel> PackedVolume::uniform(const Box& box, int level) const {
+  const auto& l = pages_->levels[static_cast<size_t>(level)];
+  const Index3 first = box.lo / l.grid.side, last = (box.hi + (l.grid.side - 1)) / l.grid.side;
+  for (int64_t z = first.z; z < last.z; ++z)
+    for (int64_t y = first.y; y < last.y; ++y)
+      for (int64_t x = first.x; x < last.x; ++x) {
+        const auto bytes = pages_->page(*container_, level, l.grid.number({x, y, z}));
+        if (!bytes || !bytes->empty()) return std::nullopt;
+      }
+  const uint32_t code = l.model->background();
+  switch (code_bytes(info_.format)) {
+    case 4:
+      return Voxel::of(params_.map.value(code));
+    case 2:
+      return Voxel::of(static_cast<uint16_t>(code));
+    default:
+      return Voxel::of(static_cast<uint8_t>(code));
+  }
+}
+
+Status PackedVolume::check(Context& ctx) const {
+  for (size_t i = 0; i < container_->table().size(); ++i) VOX_CHECK(container_->chunk(i));
+  for (size_t level = 0; level < pages_->levels.size(); ++level) {
+    const PageGrid& grid = pages_->levels[level].grid;
+    VOX_CHECK(parallel_for(ctx, grid.count.z * grid.count.y, [&](int64_t i) -> Status {
+      const Index3 lo = Index3(0, i % grid.count.y, i / grid.count.y) * grid.side;
+      const Box row{lo, glm::min(Index3(grid.dims.x, lo.y + grid.side, lo.z + grid.side), grid.dims)};
+      std::vector<std::byte> voxels(static_cast<size_t>(row.voxels() * voxel_bytes(info_.format)));
+      return decode(row, static_cast<int>(level), packed(voxels.data(), row.size(), info_.format));
+    }));
+  }
+  return {};
+}
+
+uint64_t PackedVolume::pages_decoded() const {
+  return pages_->decoded;
+}
+
+namespace {
+
+class PackedSource final : public VolumeSource {
+ public:
+  PackedSource(std::shared_ptr<const PackedVolume> volume, int level)
+      : volume_(std::move(volume)), level_(level) {
+    info_ = volume_->info();
+    info_.dims = volume_->levels()[static_cast<size_t>(level)].dims;
+    const double factor = std::ldexp(1.0, level);
+    info_.affine = info_.affine.coarser({factor, factor, factor});
+    info_.rounded = info_.rounded || volume_->params().max_error > 0;
+  }
+  Status read(const Box& box, VoxelSpan out) override { return volume_->decode(box, level_, out); }
+  std::optional<Voxel> uniform(const Box& box) const override { return volume_->uniform(box, level_); }
+
+ private:
+  std::shared_ptr<const PackedVolume> volume_;
+  int level_;
+};
+
+}  // namespace
+
+Result<std::unique_ptr<VolumeSource>> open_source(std::shared_ptr<const PackedVolume> volume, int level) {
+  const int levels = volume->params().levels;
+  if (level < 0 || level >= levels)
+    return bad_usage(fmt::format("--level {}: the file has levels 0 to {}", level, levels - 1));
+  return std::make_unique<PackedSource>(std::move(volume), level);
+}
+
+}  // namespace voxkit::svmm

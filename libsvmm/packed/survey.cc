@@ -1,0 +1,61 @@
+#include "libsvmm/packed/survey.h"
+
+#include <algorithm>
+#include <cmath>
+
+namespace voxkit::svmm {
+namespace {
+
+template <class T>
+void mark(ConstVoxelSpan voxels, Index3 size, std::vector<uint8_t>& seen) {
+  for (int64_t z = 0; z < size.z; ++z)
+    for (int64_t y = 0; y < size.y; ++y) {
+      const auto* const row = reinterpret_cast<const T*>(voxels.row(y, z));
+      for (int64_t x = 0; x < size.x; ++x) seen[row[x]] = 1;
+    }
+}
+
+ValueRange range_of(ConstVoxelSpan voxels, Index3 size) {
+  float lo = INFINITY, hi = -INFINITY;
+  for (int64_t z = 0; z < size.z; ++z)
+    for (int64_t y = 0; y < size.y; ++y) {
+      const auto* const row = reinterpret_cast<const float*>(voxels.row(y, z));
+      for (int64_t x = 0; x < size.x; ++x) {
+        const float v = row[x];
+        if (!std::isfinite(v)) continue;
+        lo = std::min(lo, v), hi = std::max(hi, v);
+      }
+    }
+  return lo <= hi ? ValueRange{static_cast<double>(lo), static_cast<double>(hi)} : ValueRange{1, 0};
+}
+
+}  // namespace
+
+Survey::Survey(VoxelFormat format) : format_(format) {
+  if (format != VoxelFormat::float32) seen_.resize(size_t{1} << 8 * voxel_bytes(format));
+}
+
+void Survey::look(ConstVoxelSpan voxels, Index3 size) {
+  if (format_ != VoxelFormat::float32) {
+    std::vector<uint8_t> seen(seen_.size());
+    format_ == VoxelFormat::density16 ? mark<uint16_t>(voxels, size, seen)
+                                      : mark<uint8_t>(voxels, size, seen);
+    const std::lock_guard lock(mutex_);
+    for (size_t i = 0; i < seen.size(); ++i) seen_[i] |= seen[i];
+    return;
+  }
+  const ValueRange found = range_of(voxels, size);
+  if (found.lo > found.hi) return;
+  const std::lock_guard lock(mutex_);
+  range_ = range_.lo <= range_.hi ? ValueRange{std::min(range_.lo, found.lo), std::max(range_.hi, found.hi)}
+                                  : found;
+}
+
+std::vector<uint32_t> Survey::values() const {
+  std::vector<uint32_t> values;
+  for (size_t i = 0; i < seen_.size(); ++i)
+    if (seen_[i]) values.push_back(static_cast<uint32_t>(i));
+  return values;
+}
+
+}  // namespace voxkit::svmm

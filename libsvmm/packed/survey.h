@@ -1,0 +1,29 @@
+// What is known of a volume's values before it is encoded.
+#pragma once
+
+#include <mutex>
+#include <vector>
+
+#include "formats/volume.h"
+
+namespace voxkit::svmm {
+
+/// Looks at all voxels of a scalar volume, in parts, in any order.
+class Survey {
+ public:
+  explicit Survey(VoxelFormat format);
+  /// Voxels of a box of that size. Thread-safe.
+  void look(ConstVoxelSpan voxels, Index3 size);
+  /// Of integers: all values there are, ascending.
+  std::vector<uint32_t> values() const;
+  /// Of floats: the least and greatest finite value; 0 to 0 where there is none.
+  ValueRange range() const { return range_.lo <= range_.hi ? range_ : ValueRange{}; }
+
+ private:
+  VoxelFormat format_;
+  std::mutex mutex_;
+  std::vector<uint8_t> seen_;  ///< by value of integers
+  ValueRange range_{1, 0};
+};
+
+}  // namespace voxkit::svmm

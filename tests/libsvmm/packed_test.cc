@@ -1,0 +1,291 @@
+// Layout packed: what comes back, at every level, from whole files and damaged ones.
+#include "libsvmm/packed/packed.h"
+
+#include <gtest/gtest.h>
+
+#include <cmath>
+#include <limits>
+#include <map>
+
+#include "formats/volume/open_volume.h"
+#include "libsvmm/packed/packed_layout.h"
+#include "tests/attack.h"
+#include "tests/damage.h"
+#include "tests/libsvmm/volumes.h"
+
+namespace voxkit::svmm {
+namespace {
+
+using namespace voxkit::svmm::test;
+using voxkit::test::Bytes;
+
+MemoryBudget& memory() {
+  static MemoryBudget budget(uint64_t{1} << 30);
+  return budget;
+}
+Context context(int threads = 2) {
+  Context ctx;
+  ctx.threads = threads;
+  ctx.memory = &memory();
+  return ctx;
+}
+
+struct Written {
+  Bytes bytes;
+  PackedParams params;
+};
+Written encode(VolumeSource& source, const PackedOptions& options, int threads = 2) {
+  Context ctx = context(threads);
+  Written out;
+  const auto params = encode_packed(
+      source, options,
+      [&](std::span<const std::byte> bytes) -> Status {
+        out.bytes.insert(out.bytes.end(), bytes.begin(), bytes.end());
+        return {};
+      },
+      ctx);
+  EXPECT_TRUE(params) << params.error().what;
+  if (params) out.params = *params;
+  return out;
+}
+std::shared_ptr<const PackedVolume> open(const Bytes& file) {
+  const auto bytes = std::make_shared<const Bytes>(file);
+  auto container = Container::open(*bytes, "packed", bytes);
+  EXPECT_TRUE(container) << container.error().what;
+  auto volume = PackedVolume::open(*container, memory());
+  EXPECT_TRUE(volume) << volume.error().what;
+  return volume ? *volume : nullptr;
+}
+Bytes decode(const PackedVolume& volume, int level, const Box& box) {
+  Bytes voxels(static_cast<size_t>(box.voxels() * voxel_bytes(volume.info().format)));
+  const Status status = volume.decode(box, level, packed(voxels.data(), box.size(), volume.info().format));
+  EXPECT_TRUE(status) << status.error().what;
+  return voxels;
+}
+Bytes decode(const PackedVolume& volume, int level = 0) {
+  return decode(volume, level, {{0, 0, 0}, volume.levels()[static_cast<size_t>(level)].dims});
+}
+
+const VoxelFormat scalars[] = {VoxelFormat::density8, VoxelFormat::density16, VoxelFormat::float32,
+                               VoxelFormat::bitmap};
+const Index3 shapes[] = {{1, 1, 1}, {17, 5, 33}, {16, 16, 16}, {40, 30, 20}, {1, 100, 2}};
+
+TEST(Packed, EveryVoxelComesBack) {
+  uint32_t seed = 0;
+  for (const VoxelFormat format : scalars)
+    for (const Index3 dims : shapes)
+      for (const Content content : {Content::blobs, Content::noise})
+        for (const int side : {8, 16})
+          for (const bool levels : {false, true}) {
+            const VolumeInfo info = make_info(dims, format);
+            const Bytes voxels = bytes_of(make_voxels(info, content, ++seed), format);
+            voxkit::test::MemorySource source(info, voxels);
+            const Written file = encode(source, {.max_error = 0, .levels = levels, .page_side = side});
+            const auto volume = open(file.bytes);
+            ASSERT_TRUE(volume);
+            EXPECT_EQ(decode(*volume), voxels) << name(format) << " seed " << seed;
+            Context ctx = context();
+            EXPECT_TRUE(volume->check(ctx));
+            EXPECT_EQ(volume->params().levels, levels ? level_count(dims, side) : 1);
+            const Written alone = encode(source, {.max_error = 0, .levels = levels, .page_side = side}, 1);
+            EXPECT_EQ(alone.bytes, file.bytes);
+          }
+}
+
+/// The value that a voxel of the next level stands for, by the book.
+double mean_at(const std::vector<double>& values, Index3 dims, Index3 at, bool floats) {
+  double sum = 0;
+  int count = 0;
+  for (int i = 0; i < 8; ++i) {
+    const Index3 v = at * int64_t{2} + Index3(i & 1, i >> 1 & 1, i >> 2);
+    if (v.x >= dims.x || v.y >= dims.y || v.z >= dims.z) continue;
+    sum += values[static_cast<size_t>((v.z * dims.y + v.y) * dims.x + v.x)], ++count;
+  }
+  return floats ? static_cast<double>(static_cast<float>(sum / count)) : std::floor(sum / count + 0.5);
+}
+std::vector<double> numbers(const Bytes& voxels, VoxelFormat format) {
+  std::vector<double> out;
+  for (size_t i = 0; i < voxels.size(); i += static_cast<size_t>(voxel_bytes(format))) {
+    Voxel v;
+    std::memcpy(v.bytes.data(), &voxels[i], static_cast<size_t>(voxel_bytes(format)));
+    out.push_back(format == VoxelFormat::float32 ? static_cast<double>(v.as<float>()) : v.as<uint32_t>());
+  }
+  return out;
+}
+
+TEST(Packed, LevelsAreMeans) {
+  for (const VoxelFormat format : {VoxelFormat::density8, VoxelFormat::density16, VoxelFormat::float32}) {
+    const VolumeInfo info = make_info({37, 18, 51}, format);
+    voxkit::test::MemorySource source(info, bytes_of(make_voxels(info, Content::noise, 7), format));
+    const auto volume = open(encode(source, {}).bytes);
+    ASSERT_TRUE(volume);
+    std::vector<double> finer = numbers(decode(*volume), format);
+    for (int level = 1; level < volume->params().levels; ++level) {
+      const Index3 dims = volume->levels()[static_cast<size_t>(level)].dims,
+                   below = volume->levels()[static_cast<size_t>(level - 1)].dims;
+      const auto coarser = numbers(decode(*volume, level), format);
+      for (size_t i = 0; i < coarser.size(); ++i) {
+        const auto n = static_cast<int64_t>(i);
+        const Index3 at(n % dims.x, n / dims.x % dims.y, n / (dims.x * dims.y));
+        ASSERT_EQ(coarser[i], mean_at(finer, below, at, format == VoxelFormat::float32)) << "level " << level;
+      }
+      finer = coarser;
+    }
+  }
+}
+
+TEST(Packed, LevelsOfLabelsAreTheCommonest) {
+  VolumeInfo info = make_info({3, 2, 2}, VoxelFormat::density8);
+  info.dims = {18, 2, 2};
+  info.is_labels = true;
+  Bytes voxels(72, std::byte{9});
+  // Of the first cube three 5, three 7 and two 9: the least of the commonest.
+  const size_t cube[] = {0, 1, 18, 19, 36, 37, 54, 55};
+  const int labels[] = {7, 5, 9, 7, 5, 9, 7, 5};
+  for (size_t i = 0; i < 8; ++i) voxels[cube[i]] = static_cast<std::byte>(labels[i]);
+  voxkit::test::MemorySource source(info, voxels);
+  const auto volume = open(encode(source, {}).bytes);
+  ASSERT_EQ(volume->params().levels, 2);
+  const Bytes coarser = decode(*volume, 1);
+  EXPECT_EQ(coarser[0], std::byte{5});
+  EXPECT_EQ(coarser[1], std::byte{9});
+}
+
+TEST(Packed, NoVoxelIsFurtherThanTheBound) {
+  uint32_t seed = 50;
+  for (const VoxelFormat format : {VoxelFormat::density8, VoxelFormat::density16, VoxelFormat::float32})
+    for (const Content content : {Content::blobs, Content::noise})
+      for (const double bound : {0.3, 1.0, 4.0, 17.5, 300.0}) {
+        const VolumeInfo info = make_info({37, 18, 21}, format);
+        const Bytes voxels = bytes_of(make_voxels(info, content, ++seed), format);
+        voxkit::test::MemorySource source(info, voxels);
+        const Written file = encode(source, {.max_error = bound});
+        const auto volume = open(file.bytes);
+        ASSERT_TRUE(volume);
+        const auto before = numbers(voxels, format), after = numbers(decode(*volume), format);
+        double worst = 0;
+        for (size_t i = 0; i < before.size(); ++i) worst = std::max(worst, std::abs(before[i] - after[i]));
+        EXPECT_LE(worst, bound) << name(format);
+        EXPECT_LE(file.bytes.size(), encode(source, {}).bytes.size());
+      }
+}
+
+TEST(Packed, FloatsThatAreNoNumbersComeBack) {
+  VolumeInfo info = make_info({20, 9, 7}, VoxelFormat::float32);
+  auto made = make_voxels(info, Content::blobs, 3);
+  constexpr float infinity = std::numeric_limits<float>::infinity();
+  const float special[] = {NAN, infinity, -infinity, -0.0f, 1e-45f, 3e38f, -3e38f};
+  for (size_t i = 0; i < std::size(special); ++i) made[i * 31] = Voxel::of(special[i]);
+  const Bytes voxels = bytes_of(made, info.format);
+  voxkit::test::MemorySource source(info, voxels);
+  EXPECT_EQ(decode(*open(encode(source, {}).bytes)), voxels);
+  const auto lossy = open(encode(source, {.max_error = 1e35}).bytes);
+  const auto before = numbers(voxels, info.format), after = numbers(decode(*lossy), info.format);
+  for (size_t i = 0; i < before.size(); ++i) {
+    if (std::isfinite(before[i]))
+      EXPECT_LE(std::abs(before[i] - after[i]), 1e35);
+    else
+      EXPECT_TRUE(std::isnan(before[i]) ? std::isnan(after[i]) : before[i] == after[i]);
+  }
+}
+
+TEST(Packed, ABoxTouchesItsPagesOnly) {
+  const VolumeInfo info = make_info({100, 90, 80}, VoxelFormat::density8);
+  const auto made = make_voxels(info, Content::noise, 5);
+  const Bytes voxels = bytes_of(made, info.format);
+  voxkit::test::MemorySource source(info, voxels);
+  const auto volume = open(encode(source, {}).bytes);
+  const Box box{{15, 16, 31}, {33, 32, 33}};
+  const Bytes part = decode(*volume, 0, box);
+  EXPECT_EQ(volume->pages_decoded(), 3u * 1 * 2);
+  for (int64_t z = box.lo.z, i = 0; z < box.hi.z; ++z)
+    for (int64_t y = box.lo.y; y < box.hi.y; ++y)
+      for (int64_t x = box.lo.x; x < box.hi.x; ++x, ++i) {
+        const std::byte expected = voxels[static_cast<size_t>((z * 90 + y) * 100 + x)];
+        ASSERT_EQ(part[static_cast<size_t>(i)], expected);
+        const auto one = volume->sample({x, y, z});
+        ASSERT_TRUE(one);
+        ASSERT_EQ(one->bytes[0], expected);
+      }
+  EXPECT_EQ(volume->pages_decoded(), 12u);  // each of them once more, then they were kept
+}
+
+TEST(Packed, OneValueTakesNoBytesAndIsKnown) {
+  const VolumeInfo info = make_info({100, 90, 80}, VoxelFormat::density16);
+  voxkit::test::FlatSource flat(info, Voxel::of(uint16_t{777}));
+  // The survey reads it; pages do not.
+  const Bytes voxels = bytes_of(std::vector<Voxel>(720000, Voxel::of(uint16_t{777})), info.format);
+  voxkit::test::MemorySource source(info, voxels);
+  const auto volume = open(encode(source, {.levels = false}).bytes);
+  EXPECT_EQ(volume->uniform(info.box(), 0), Voxel::of(uint16_t{777}));
+  EXPECT_EQ(volume->pages_decoded(), 0u);
+  EXPECT_EQ(decode(*volume), voxels);
+  EXPECT_LT(volume->container().file_bytes(), 1500u);
+}
+
+TEST(Packed, WhatIsNotHeldIsRefused) {
+  Context ctx = context();
+  const auto refused = [&](VoxelFormat format, PackedOptions options, const char* word, bool labels = false) {
+    VolumeInfo info = make_info({4, 4, 4}, format);
+    info.is_labels = labels;
+    voxkit::test::MemorySource source(info, bytes_of(make_voxels(info, Content::noise, 1), format));
+    const auto done = encode_packed(
+        source, options, [](auto) { return Status(); }, ctx);
+    ASSERT_FALSE(done);
+    EXPECT_EQ(done.error().code, ErrorCode::usage);
+    EXPECT_NE(done.error().what.find(word), std::string::npos) << done.error().what;
+  };
+  refused(VoxelFormat::rgba32, {}, "RGBA32");
+  refused(VoxelFormat::density8, {.page_side = 12}, "8 or 16");
+  refused(VoxelFormat::density8, {.max_error = NAN}, "finite");
+  refused(VoxelFormat::density16, {.max_error = 3e9}, "2^31");
+  refused(VoxelFormat::density8, {.max_error = 1}, "labels", true);
+}
+
+/// Whatever the bytes: an error, or as many voxels as were asked for.
+std::string attack(std::span<const std::byte> file) {
+  const auto open_packed = [](const std::shared_ptr<const Container>& container) {
+    return PackedVolume::open(container, memory());
+  };
+  return voxkit::test::attack_with<voxkit::test::Answer>(
+             file, open_packed,
+             [](const PackedVolume& volume, voxkit::test::Answer& answer, Context&) {
+               for (int level = 0; level < volume.params().levels && answer.fault.empty(); ++level)
+                 for (const Box& box :
+                      voxkit::test::boxes_of(volume.levels()[static_cast<size_t>(level)].dims)) {
+                   std::optional<std::vector<std::byte>> decoded;
+                   answer.fault = voxkit::test::ask_box(
+                       volume.info().format, box, decoded,
+                       [&](const Box& part, VoxelSpan out) { return volume.decode(part, level, out); },
+                       [&](Index3 voxel) { return volume.sample(voxel, level); },
+                       [&](const Box& part) { return volume.uniform(part, level); });
+                   if (answer.fault.empty() && answer.checked && !decoded)
+                     answer.fault = "checked, and damaged";
+                 }
+             })
+      .fault;
+}
+
+TEST(Packed, DamagedFilesAreRefusedOrRead) {
+  std::mt19937 random(4);
+  const int tries = std::getenv("VOXKIT_MUTATIONS") ? std::atoi(std::getenv("VOXKIT_MUTATIONS")) : 400;
+  for (const VoxelFormat format : scalars)
+    for (const double bound : {0.0, 2.0}) {
+      if (format == VoxelFormat::bitmap && bound > 0) continue;
+      const VolumeInfo info = make_info({19, 18, 17}, format);
+      voxkit::test::MemorySource source(info, bytes_of(make_voxels(info, Content::blobs, 3), format));
+      const Bytes file = encode(source, {.max_error = bound}).bytes;
+      ASSERT_EQ(attack(file), "");
+      for (size_t length = 0; length < file.size(); length += 7)
+        ASSERT_EQ(attack(std::span(file).first(length)), "") << length;
+      for (int i = 0; i < tries; ++i) {
+        Bytes bad = file;
+        voxkit::test::damage(bad, 0, bad.size(), false, random);
+        voxkit::test::repair(bad);
+        ASSERT_EQ(attack(bad), "") << name(format) << " damage " << i;
+      }
+    }
+}
+
+}  // namespace
+}  // namespace voxkit::svmm
