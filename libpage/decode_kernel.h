@@ -58,35 +58,43 @@ template <class Width, int lane_count, class RowOut>
     for (int y = 0; y < extent.ny; ++y) {
       std::array<Stored*, lane_count> row;
       std::array<uint16_t*, lane_count> magnitudes;
-      std::array<Sum, lane_count> left{};
+      std::array<Left<Width>, lane_count> left{};
       std::array<RansDecoder, lane_count> coder;
       for (size_t n = 0; n < lane_count; ++n) {
         plan_row<Width>(model, extent, y, z, lanes[n].memory, lanes[n].plan);
-        row[n] = lanes[n].memory.samples[static_cast<size_t>(z & 1)][static_cast<size_t>(y)].data() + row_start;
-        magnitudes[n] =
-            lanes[n].memory.magnitudes[static_cast<size_t>(z & 1)][static_cast<size_t>(y)].data() + row_start;
+        row[n] = row_of(lanes[n].memory.samples, y, z);
+        magnitudes[n] = row_of(lanes[n].memory.magnitudes, y, z);
         coder[n] = lanes[n].coder;
       }
-      for (size_t x = 0; x < static_cast<size_t>(extent.nx); ++x)
-        for (size_t n = 0; n < lane_count; ++n) {
-          const RowPlan<Width>& plan = lanes[n].plan;
-          const Sum mean = (plan.base[x] + plan.left_weight[x] * left[n]) >> weight_bits;
-          const Sum predicted = std::clamp(mean, lowest, highest);
-          const uint32_t folded = decode_folded<Width>(coder[n], slots + plan.context[x]);
-          const int32_t residual = unfold(folded);
-          Sum value;
-          if constexpr (Width::escape_bits == 32) {
-            value = wraps ? static_cast<Sum>(static_cast<uint32_t>(predicted) + static_cast<uint32_t>(residual))
-                          : static_cast<Sum>(static_cast<uint64_t>(predicted) +
-                                             static_cast<uint64_t>(int64_t{residual}) * step);
-          } else {
-            value = static_cast<Sum>(static_cast<uint32_t>(predicted) +
-                                     static_cast<uint32_t>(residual) * static_cast<uint32_t>(step));
-          }
-          left[n] = std::clamp(value, lowest, highest);
-          row[n][x] = static_cast<Stored>(left[n]);
-          magnitudes[n][x] = static_cast<uint16_t>(std::min(magnitude(folded), most_magnitude));
+      const auto voxel = [&](size_t n, size_t x) __attribute__((always_inline)) {
+        const RowPlan<Width>& plan = lanes[n].plan;
+        const uint32_t folded =
+            decode_folded<Width>(coder[n], slots + size_t{context_at(plan, x, left[n])} * table_total);
+        const Sum mean = predict(plan, x, left[n]);
+        const Sum predicted = std::clamp<Sum>(mean >> weight_bits, lowest, highest);
+        const uint32_t mirror = mirror_of(mean);
+        const auto residual = static_cast<int32_t>((static_cast<uint32_t>(unfold(folded)) ^ mirror) - mirror);
+        Sum value;
+        if constexpr (Width::escape_bits == 32) {
+          value = wraps ? static_cast<Sum>(static_cast<uint32_t>(predicted) + static_cast<uint32_t>(residual))
+                        : static_cast<Sum>(static_cast<uint64_t>(predicted) +
+                                           static_cast<uint64_t>(int64_t{residual}) * step);
+        } else {
+          value = static_cast<Sum>(static_cast<uint32_t>(predicted) +
+                                   static_cast<uint32_t>(residual) * static_cast<uint32_t>(step));
         }
+        left[n].second = left[n].sample;
+        left[n].sample = std::clamp(value, lowest, highest);
+        left[n].magnitude = std::min(magnitude(folded), most_magnitude);
+        row[n][x] = static_cast<Stored>(left[n].sample);
+        magnitudes[n][x] = static_cast<uint16_t>(left[n].magnitude);
+      };
+      for (size_t n = 0; n < lane_count; ++n) {
+        voxel(n, 0);
+        left[n].second = left[n].sample;
+      }
+      for (size_t x = 1; x < static_cast<size_t>(extent.nx); ++x)
+        for (size_t n = 0; n < lane_count; ++n) voxel(n, x);
       for (size_t n = 0; n < lane_count; ++n) {
         lanes[n].coder = coder[n];
         pad_row(row[n], extent.nx);
