@@ -21,10 +21,9 @@ struct Residuals {
 template <class Width>
 void find_residuals(const ModelData& model, std::span<const uint32_t> samples, Extent extent, Residuals& out,
                     uint32_t* decoded = nullptr) {
-  using Sum = typename Width::Sum;
   using Stored = typename Width::Stored;
-  constexpr auto lowest = static_cast<Sum>(-static_cast<int64_t>(Width::offset));
-  const auto highest = static_cast<Sum>(static_cast<int64_t>(model.max_value) - Width::offset);
+  constexpr int64_t lowest = -int64_t{Width::offset};
+  const int64_t highest = int64_t{model.max_value} - Width::offset;
   const auto step = static_cast<int64_t>(model.step());
   const auto bound = static_cast<int64_t>(model.max_error);
   Memory<Width> memory;
@@ -38,15 +37,15 @@ void find_residuals(const ModelData& model, std::span<const uint32_t> samples, E
       Left<Width> left;
       for (size_t x = 0; x < static_cast<size_t>(extent.nx); ++x, ++at) {
         out.context[at] = static_cast<uint8_t>(context_at(plan, x, left));
-        const Sum mean = predict(plan, x, left);
-        const Sum predicted = std::clamp<Sum>(mean >> weight_bits, lowest, highest);
-        const auto value = static_cast<Sum>(static_cast<int64_t>(samples[at]) - Width::offset);
-        const int64_t difference = int64_t{value} - int64_t{predicted};
+        const int64_t mean = predict(plan, x, left);
+        const int64_t predicted = std::clamp(mean >> weight_bits, lowest, highest);
+        const int64_t value = int64_t{samples[at]} - Width::offset;
+        const int64_t difference = value - predicted;
         int64_t residual = difference;
-        Sum decoded_value = value;
+        int64_t decoded_value = value;
         if (bound != 0) {
           residual = difference < 0 ? -((bound - difference) / step) : (difference + bound) / step;
-          decoded_value = static_cast<Sum>(std::clamp<int64_t>(predicted + residual * step, lowest, highest));
+          decoded_value = std::clamp(predicted + residual * step, lowest, highest);
         }
         // Lossless ones of 32 bits count modulo 2^32.
         const uint32_t mirror = mirror_of(mean);
@@ -58,7 +57,7 @@ void find_residuals(const ModelData& model, std::span<const uint32_t> samples, E
         row[x] = static_cast<Stored>(decoded_value);
         magnitudes[x] = static_cast<uint16_t>(left.magnitude);
         out.folded[at] = folded;
-        if (decoded) decoded[at] = static_cast<uint32_t>(static_cast<int64_t>(decoded_value) + Width::offset);
+        if (decoded) decoded[at] = static_cast<uint32_t>(decoded_value + Width::offset);
       }
       pad_row(row, extent.nx);
       pad_row(magnitudes, extent.nx);

@@ -3,6 +3,7 @@
 
 #include "libpage/model_data.h"
 #include "libpage/page.h"
+#include "libpage/row.h"
 
 namespace voxkit::page {
 namespace {
@@ -42,10 +43,10 @@ bool read_weights(BitReader& in, Weights& weights, int voxel_class) {
 
 void ModelData::derive() {
   half_steps = static_cast<uint32_t>((uint64_t{1} << 15) / step());
-  slots.resize(size_t{context_count} * table_total);
+  decoding.resize(context_count);
   for (size_t c = 0; c < context_count; ++c) {
     starts[c] = page::starts(tables[c]);
-    fill_slots(tables[c], std::span<uint32_t, table_total>(slots.data() + c * table_total, table_total));
+    fill_decoding_table(tables[c], wide() ? Wide::escape_bits : Narrow::escape_bits, decoding[c]);
   }
 }
 

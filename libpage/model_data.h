@@ -29,7 +29,7 @@ struct ModelData {
   // From these:
   uint32_t half_steps = 0;  ///< 2^15 / step: turns a range into half its steps
   std::array<std::array<uint16_t, symbol_count>, context_count> starts{};
-  std::vector<uint32_t> slots;  ///< of the tables, one after another
+  std::vector<DecodingTable> decoding;
 
   uint64_t step() const { return 2 * uint64_t{max_error} + 1; }
   bool wide() const { return max_value > 0xffff; }

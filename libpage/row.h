@@ -95,18 +95,21 @@ template <class Width>
   if (y == 0) above = behind;
   if (z == 0) behind = above;
   // Least and greatest of four rows, then of three neighbours in these.
-  std::array<Stored, max_side + 2> least, greatest;
-  for (int x = 0; x < max_side + 2; ++x) {
-    const auto at = static_cast<size_t>(x);
-    least[at] = std::min(std::min(rows[0][x - 1], rows[1][x - 1]), std::min(rows[2][x - 1], rows[3][x - 1]));
-    greatest[at] = std::max(std::max(rows[0][x - 1], rows[1][x - 1]), std::max(rows[2][x - 1], rows[3][x - 1]));
+  std::array<Stored, row_stride> least, greatest;
+  for (int x = -1; x <= max_side; ++x) {
+    const Stored a = rows[0][x], b = rows[1][x], c = rows[2][x], d = rows[3][x];
+    const Stored low1 = a < b ? a : b, low2 = c < d ? c : d, high1 = a > b ? a : b, high2 = c > d ? c : d;
+    least[static_cast<size_t>(x + row_start)] = low1 < low2 ? low1 : low2;
+    greatest[static_cast<size_t>(x + row_start)] = high1 > high2 ? high1 : high2;
   }
-  for (size_t x = 0; x < max_side; ++x) {
-    const Stored lowest = std::min(std::min(least[x], least[x + 1]), least[x + 2]);
-    const Stored highest = std::max(std::max(greatest[x], greatest[x + 1]), greatest[x + 2]);
-    const auto at = static_cast<int>(x);
-    const int magnitudes = 2 * (above[at] + behind[at]) + above[at - 1] + above[at + 1] + behind[at - 1] + behind[at + 1];
-    plan.activity[x] = static_cast<uint16_t>(magnitudes + Width::range_share(lowest, highest, model.half_steps));
+  const Stored *low = least.data() + row_start, *high = greatest.data() + row_start;
+  for (int x = 0; x < max_side; ++x) {
+    const Stored low1 = low[x - 1] < low[x + 1] ? low[x - 1] : low[x + 1];
+    const Stored high1 = high[x - 1] > high[x + 1] ? high[x - 1] : high[x + 1];
+    const int magnitudes = 2 * (above[x] + behind[x]) + above[x - 1] + above[x + 1] + behind[x - 1] + behind[x + 1];
+    plan.activity[static_cast<size_t>(x)] = static_cast<uint16_t>(
+        magnitudes +
+        Width::range_share(low1 < low[x] ? low1 : low[x], high1 > high[x] ? high1 : high[x], model.half_steps));
   }
   plan.activity[0] = static_cast<uint16_t>(plan.activity[0] + left_share * above[0]);
 }
@@ -121,13 +124,13 @@ template <class Stored>
 /// What a voxel's left neighbours add to its plan.
 template <class Width>
 struct Left {
-  typename Width::Sum sample = 0, second = 0;
+  int64_t sample = 0, second = 0;
   uint32_t magnitude = 0;
 };
 
 /// Before the shift.
 template <class Width>
-[[gnu::always_inline]] inline typename Width::Sum predict(const RowPlan<Width>& plan, size_t x,
+[[gnu::always_inline]] inline int64_t predict(const RowPlan<Width>& plan, size_t x,
                                                           const Left<Width>& left) {
   return plan.base[x] + plan.left_weight[x] * left.sample + plan.second_left_weight[x] * left.second;
 }
@@ -137,8 +140,7 @@ template <class Width>
 }
 /// All ones where the prediction lies above the whole number next to it: then residuals change their sign, so
 /// that of two small ones the likelier is the first.
-template <class Sum>
-[[gnu::always_inline]] inline uint32_t mirror_of(Sum mean) {
+[[gnu::always_inline]] inline uint32_t mirror_of(int64_t mean) {
   return 0u - (static_cast<uint32_t>(mean) >> (weight_bits - 1) & 1u);
 }
 
