@@ -1,4 +1,5 @@
-// Contexts: how large residuals of neighbours in earlier rows are says how large the next may be.
+// Contexts: how large the residuals of neighbours are, and how far neighbours are apart, says how large the
+// next residual may be.
 #pragma once
 
 #include <array>
@@ -8,18 +9,32 @@ namespace voxkit::page {
 
 /// Magnitudes of residuals are remembered up to this.
 inline constexpr uint32_t most_magnitude = 255;
-/// A weighted sum of magnitudes: twice those above and behind, once those beside these.
-inline constexpr uint32_t most_activity = 8 * most_magnitude;
-inline constexpr int activity_steps = 16;
-/// Without a row above and behind; without a plane behind; without a row above; others.
-inline constexpr int context_count = 1 + 3 * activity_steps;
+/// Activity of what lies in earlier rows: twice the magnitudes above and behind, once those beside these, and
+/// half the range of the twelve samples around in steps of the quantiser. The voxel before adds twice its
+/// own.
+inline constexpr uint32_t most_row_activity = 3500;
+inline constexpr uint32_t left_share = 2;
+inline constexpr uint32_t most_activity = most_row_activity + left_share * most_magnitude;
+inline constexpr int activity_steps = 24;
+/// In the first plane; in the first row of others; in other rows.
+inline constexpr int context_count = 3 * activity_steps;
 /// The least activity of each step from the second on.
-using Thresholds = std::array<uint16_t, activity_steps - 1>;
-inline constexpr Thresholds default_thresholds = {1, 3, 6, 9, 13, 18, 24, 32, 44, 60, 85, 125, 190, 300, 520};
+inline constexpr std::array<uint16_t, activity_steps - 1> thresholds = {
+    1, 2, 3, 4, 5, 6, 7, 8, 11, 15, 20, 27, 37, 49, 67, 90, 122, 164, 222, 299, 404, 546, 737};
+
+inline constexpr std::array<uint8_t, most_activity + 1> step_of_activity = [] {
+  std::array<uint8_t, most_activity + 1> steps{};
+  size_t next = 0;
+  for (uint32_t activity = 0; activity <= most_activity; ++activity) {
+    while (next < thresholds.size() && activity >= thresholds[next]) ++next;
+    steps[activity] = static_cast<uint8_t>(next);
+  }
+  return steps;
+}();
 
 /// The context of activity 0 in row (y, z).
-constexpr int first_context(int y, int z) {
-  return z == 0 ? (y == 0 ? 0 : 1) : (y == 0 ? 1 + activity_steps : 1 + 2 * activity_steps);
+constexpr uint32_t first_context(int y, int z) {
+  return static_cast<uint32_t>((z == 0 ? 0 : y == 0 ? 1 : 2) * activity_steps);
 }
 
 }  // namespace voxkit::page

@@ -4,6 +4,7 @@
 
 #include <algorithm>
 #include <array>
+#include <utility>
 
 #include "libpage/rans.h"
 #include "libpage/row.h"
@@ -19,26 +20,23 @@ struct Lane {
 };
 
 template <class Width>
-inline constexpr auto bins = make_bins(Width::escape_bits);
-
-template <class Width>
-[[gnu::always_inline]] inline uint32_t decode_folded(RansDecoder& coder, const uint32_t* slots) {
-  const uint32_t slot = slots[coder.state & (table_total - 1)];
-  coder.state = (coder.state >> table_bits) * ((slot & (table_total - 1)) + 1) +
-                (slot >> table_bits & (table_total - 1));
-  const Bin bin = bins<Width>[slot >> (2 * table_bits)];
+[[gnu::always_inline]] inline uint32_t decode_folded(RansDecoder& coder, const DecodingTable& table) {
+  const uint64_t slot = coder.state & (table_total - 1);
+  const uint64_t word = table.word[table.symbol_at[slot]];
+  coder.state = (coder.state >> table_bits) * (word & 0xfff) + slot - (word >> 12 & (table_total - 1));
+  const auto base = static_cast<uint32_t>(word >> 32), raw_bits = static_cast<uint32_t>(word >> 23 & 63);
   if constexpr (Width::escape_bits <= 21) {
-    const uint32_t raw = coder.raw(bin.raw_bits);
+    const uint32_t raw = coder.raw(raw_bits);
     coder.renew();
-    return bin.base + raw;
+    return base + raw;
   } else {
     coder.renew();
-    const uint32_t low_bits = std::min(bin.raw_bits, 16u);
+    const uint32_t low_bits = std::min(raw_bits, 16u);
     const uint32_t low = coder.raw(low_bits);
     coder.renew();
-    const uint32_t high = coder.raw(bin.raw_bits - low_bits);
+    const uint32_t high = coder.raw(raw_bits - low_bits);
     coder.renew();
-    return bin.base + (high << low_bits | low);
+    return base + (high << low_bits | low);
   }
 }
 
@@ -47,53 +45,59 @@ template <class Width, int lane_count, class RowOut>
 [[gnu::always_inline]] inline void decode_lanes(const ModelData& model, Extent extent,
                                                 std::array<Lane<Width>, lane_count>& lanes,
                                                 const RowOut& row_out) {
-  using Sum = typename Width::Sum;
   using Stored = typename Width::Stored;
-  const uint32_t* const slots = model.slots.data();
-  constexpr auto lowest = static_cast<Sum>(-static_cast<int64_t>(Width::offset));
-  const auto highest = static_cast<Sum>(static_cast<int64_t>(model.max_value) - Width::offset);
+  const DecodingTable* const tables = model.decoding.data();
+  constexpr int64_t lowest = -int64_t{Width::offset};
+  const int64_t highest = int64_t{model.max_value} - Width::offset;
   const uint64_t step = model.step();
-  const bool wraps = model.max_error == 0 && Width::escape_bits == 32;
+  [[maybe_unused]] const bool wraps = model.max_error == 0;
+  // Numbers of lanes are constants, so that what is of a lane can be in registers.
+  const auto each = [](const auto& body) __attribute__((always_inline)) {
+    [&]<size_t... n>(std::index_sequence<n...>) __attribute__((always_inline)) {
+      (body(std::integral_constant<size_t, n>{}), ...);
+    }(std::make_index_sequence<lane_count>{});
+  };
+  std::array<Stored*, lane_count> row;
+  std::array<uint16_t*, lane_count> magnitudes;
+  std::array<Left<Width>, lane_count> left{};
+  std::array<RansDecoder, lane_count> coder;
+  each([&](auto n) __attribute__((always_inline)) { coder[n] = lanes[n].coder; });
   for (int z = 0; z < extent.nz; ++z)
     for (int y = 0; y < extent.ny; ++y) {
-      std::array<Stored*, lane_count> row;
-      std::array<uint16_t*, lane_count> magnitudes;
-      std::array<Sum, lane_count> left{};
-      std::array<RansDecoder, lane_count> coder;
-      for (size_t n = 0; n < lane_count; ++n) {
+      each([&](auto n) __attribute__((always_inline)) {
         plan_row<Width>(model, extent, y, z, lanes[n].memory, lanes[n].plan);
-        row[n] = lanes[n].memory.samples[static_cast<size_t>(z & 1)][static_cast<size_t>(y)].data() + row_start;
-        magnitudes[n] =
-            lanes[n].memory.magnitudes[static_cast<size_t>(z & 1)][static_cast<size_t>(y)].data() + row_start;
-        coder[n] = lanes[n].coder;
-      }
-      for (size_t x = 0; x < static_cast<size_t>(extent.nx); ++x)
-        for (size_t n = 0; n < lane_count; ++n) {
-          const RowPlan<Width>& plan = lanes[n].plan;
-          const Sum mean = (plan.base[x] + plan.left_weight[x] * left[n]) >> weight_bits;
-          const Sum predicted = std::clamp(mean, lowest, highest);
-          const uint32_t folded = decode_folded<Width>(coder[n], slots + plan.context[x]);
-          const int32_t residual = unfold(folded);
-          Sum value;
-          if constexpr (Width::escape_bits == 32) {
-            value = wraps ? static_cast<Sum>(static_cast<uint32_t>(predicted) + static_cast<uint32_t>(residual))
-                          : static_cast<Sum>(static_cast<uint64_t>(predicted) +
-                                             static_cast<uint64_t>(int64_t{residual}) * step);
-          } else {
-            value = static_cast<Sum>(static_cast<uint32_t>(predicted) +
-                                     static_cast<uint32_t>(residual) * static_cast<uint32_t>(step));
-          }
-          left[n] = std::clamp(value, lowest, highest);
-          row[n][x] = static_cast<Stored>(left[n]);
-          magnitudes[n][x] = static_cast<uint16_t>(std::min(magnitude(folded), most_magnitude));
-        }
-      for (size_t n = 0; n < lane_count; ++n) {
-        lanes[n].coder = coder[n];
+        row[n] = row_of(lanes[n].memory.samples, y, z);
+        magnitudes[n] = row_of(lanes[n].memory.magnitudes, y, z);
+        left[n] = {};
+      });
+      const auto voxel = [&](size_t n, size_t x) __attribute__((always_inline)) {
+        const RowPlan<Width>& plan = lanes[n].plan;
+        const uint32_t folded = decode_folded<Width>(coder[n], tables[context_at(plan, x, left[n])]);
+        const int64_t mean = predict(plan, x, left[n]);
+        const int64_t predicted = std::clamp(mean >> weight_bits, lowest, highest);
+        const uint32_t mirror = mirror_of(mean);
+        const auto residual = static_cast<int32_t>((static_cast<uint32_t>(unfold(folded)) ^ mirror) - mirror);
+        auto value = static_cast<int64_t>(static_cast<uint64_t>(predicted) +
+                                          static_cast<uint64_t>(int64_t{residual}) * step);
+        if constexpr (Width::escape_bits == 32) value = wraps ? static_cast<uint32_t>(value) : value;
+        left[n].second = left[n].sample;
+        left[n].sample = std::clamp(value, lowest, highest);
+        left[n].magnitude = std::min(magnitude(folded), most_magnitude);
+        row[n][x] = static_cast<Stored>(left[n].sample);
+        magnitudes[n][x] = static_cast<uint16_t>(left[n].magnitude);
+      };
+      each([&](auto n) __attribute__((always_inline)) {
+        voxel(n, 0);
+        left[n].second = left[n].sample;
+      });
+      for (size_t x = 1; x < static_cast<size_t>(extent.nx); ++x) each([&](auto n) __attribute__((always_inline)) { voxel(n, x); });
+      each([&](auto n) __attribute__((always_inline)) {
         pad_row(row[n], extent.nx);
         pad_row(magnitudes[n], extent.nx);
         row_out(n, y, z, row[n]);
-      }
+      });
     }
+  each([&](auto n) __attribute__((always_inline)) { lanes[n].coder = coder[n]; });
 }
 
 }  // namespace voxkit::page

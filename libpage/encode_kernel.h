@@ -21,10 +21,9 @@ struct Residuals {
 template <class Width>
 void find_residuals(const ModelData& model, std::span<const uint32_t> samples, Extent extent, Residuals& out,
                     uint32_t* decoded = nullptr) {
-  using Sum = typename Width::Sum;
   using Stored = typename Width::Stored;
-  constexpr auto lowest = static_cast<Sum>(-static_cast<int64_t>(Width::offset));
-  const auto highest = static_cast<Sum>(static_cast<int64_t>(model.max_value) - Width::offset);
+  constexpr int64_t lowest = -int64_t{Width::offset};
+  const int64_t highest = int64_t{model.max_value} - Width::offset;
   const auto step = static_cast<int64_t>(model.step());
   const auto bound = static_cast<int64_t>(model.max_error);
   Memory<Width> memory;
@@ -33,27 +32,32 @@ void find_residuals(const ModelData& model, std::span<const uint32_t> samples, E
   for (int z = 0; z < extent.nz; ++z)
     for (int y = 0; y < extent.ny; ++y) {
       plan_row<Width>(model, extent, y, z, memory, plan);
-      Stored* row = memory.samples[static_cast<size_t>(z & 1)][static_cast<size_t>(y)].data() + row_start;
-      uint16_t* magnitudes = memory.magnitudes[static_cast<size_t>(z & 1)][static_cast<size_t>(y)].data() + row_start;
-      Sum left = 0;
+      Stored* row = row_of(memory.samples, y, z);
+      uint16_t* magnitudes = row_of(memory.magnitudes, y, z);
+      Left<Width> left;
       for (size_t x = 0; x < static_cast<size_t>(extent.nx); ++x, ++at) {
-        const Sum mean = (plan.base[x] + plan.left_weight[x] * left) >> weight_bits;
-        const Sum predicted = std::clamp(mean, lowest, highest);
-        const auto value = static_cast<Sum>(static_cast<int64_t>(samples[at]) - Width::offset);
-        const int64_t difference = int64_t{value} - int64_t{predicted};
+        out.context[at] = static_cast<uint8_t>(context_at(plan, x, left));
+        const int64_t mean = predict(plan, x, left);
+        const int64_t predicted = std::clamp(mean >> weight_bits, lowest, highest);
+        const int64_t value = int64_t{samples[at]} - Width::offset;
+        const int64_t difference = value - predicted;
         int64_t residual = difference;
-        left = value;
+        int64_t decoded_value = value;
         if (bound != 0) {
           residual = difference < 0 ? -((bound - difference) / step) : (difference + bound) / step;
-          left = static_cast<Sum>(std::clamp<int64_t>(predicted + residual * step, lowest, highest));
+          decoded_value = std::clamp(predicted + residual * step, lowest, highest);
         }
         // Lossless ones of 32 bits count modulo 2^32.
-        const uint32_t folded = fold(static_cast<int32_t>(static_cast<uint32_t>(residual)));
-        row[x] = static_cast<Stored>(left);
-        magnitudes[x] = static_cast<uint16_t>(std::min(magnitude(folded), most_magnitude));
+        const uint32_t mirror = mirror_of(mean);
+        const uint32_t folded =
+            fold(static_cast<int32_t>((static_cast<uint32_t>(residual) ^ mirror) - mirror));
+        left.second = x == 0 ? decoded_value : left.sample;
+        left.sample = decoded_value;
+        left.magnitude = std::min(magnitude(folded), most_magnitude);
+        row[x] = static_cast<Stored>(decoded_value);
+        magnitudes[x] = static_cast<uint16_t>(left.magnitude);
         out.folded[at] = folded;
-        out.context[at] = static_cast<uint8_t>(plan.context[x] / table_total);
-        if (decoded) decoded[at] = static_cast<uint32_t>(static_cast<int64_t>(left) + Width::offset);
+        if (decoded) decoded[at] = static_cast<uint32_t>(decoded_value + Width::offset);
       }
       pad_row(row, extent.nx);
       pad_row(magnitudes, extent.nx);

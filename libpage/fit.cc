@@ -7,22 +7,10 @@
 namespace voxkit::page {
 namespace {
 
-/// Normal equations of one class, in differences from its rest tap. Sums are integers: their order does not
-/// matter.
-struct Equations {
-  std::array<std::array<int64_t, tap_count>, tap_count> products{};
-  std::array<int64_t, tap_count> targets{};
-  int64_t weight = 0;
-};
-
-/// In parts of 4096: 1 / (4 + range^2 / 16).
-int64_t equation_weight(int64_t range) {
-  return (int64_t{1} << 16) / (64 + std::min<int64_t>(range, 1 << 12) * std::min<int64_t>(range, 1 << 12));
-}
-
 /// Solves a x = b for a symmetric positive definite matrix by its Cholesky factors, in one order of
 /// operations. False where it is not definite.
-bool solve(std::array<std::array<double, tap_count>, tap_count>& a, std::array<double, tap_count>& b, size_t n) {
+bool solve_definite(std::array<std::array<double, tap_count>, tap_count>& a, 
+                    std::array<double, tap_count>& b, size_t n) {
   for (size_t i = 0; i < n; ++i) {
     for (size_t j = 0; j <= i; ++j) {
       double sum = a[i][j];
@@ -46,7 +34,82 @@ bool solve(std::array<std::array<double, tap_count>, tap_count>& a, std::array<d
   return true;
 }
 
-Weights weights_of(const Equations& equations, int voxel_class, double noise) {
+}  // namespace
+
+Fit::Fit(uint32_t greatest, uint32_t max_error)
+    // Weights need no more than 20 bits of a sample.
+    : shift_(std::max(0, static_cast<int>(std::bit_width(greatest)) - 20)), equations_(class_count) {
+  const double error = static_cast<double>(max_error >> shift_);
+  quiet_ = 16 * (16 + error * error);
+}
+
+void Fit::add(std::span<const FitPage> pages, double noise) {
+  for (int i = 0; i < shift_; ++i) noise /= 4;
+  std::vector<Equations> sums(class_count);
+  for (const FitPage& page : pages) add_page(page, sums);
+  for (size_t c = 0; c < class_count; ++c) {
+    Equations& total = equations_[c];
+    // Of two taps' differences from a third, the noise is twice that of one, and once in common.
+    const double common = noise * sums[c].weight;
+    for (size_t i = 0; i < tap_count; ++i) {
+      for (size_t j = i; j < tap_count; ++j)
+        total.products[i][j] = total.products[i][j] / 2 + sums[c].products[i][j] + common + (i == j ? common : 0);
+      total.targets[i] = total.targets[i] / 2 + sums[c].targets[i] + common;
+    }
+    total.weight = total.weight / 2 + sums[c].weight;
+  }
+}
+
+void Fit::add_page(const FitPage& page, std::vector<Equations>& all) const {
+  const Extent e = page.extent;
+  const auto decoded = [&](int x, int y, int z) {
+    const int cx = std::clamp(x, 0, e.nx - 1), cy = std::clamp(y, 0, e.ny - 1), cz = std::max(z, 0);
+    return static_cast<double>(page.decoded[static_cast<size_t>((cz * e.ny + cy) * e.nx + cx)] >> shift_);
+  };
+  size_t at = 0;
+  for (int z = 0; z < e.nz; ++z)
+    for (int y = 0; y < e.ny; ++y)
+      for (int x = 0; x < e.nx; ++x, ++at) {
+        const int voxel_class = class_of(place(x, e.nx), place(y, e.ny), z > 0);
+        const int rest = rest_tap(voxel_class);
+        if (rest < 0) continue;
+        Row taps{};
+        for (int dy = -1; dy <= 1; ++dy)
+          for (int dx = -1; dx <= 1; ++dx) taps[static_cast<size_t>(3 * dy + dx + 4)] = decoded(x + dx, y + dy, z - 1);
+        for (int dx = -1; dx <= 1; ++dx) taps[static_cast<size_t>(dx + 10)] = decoded(x + dx, y - 1, z);
+        taps[left_tap] = decoded(x - 1, y, z);
+        taps[second_left_tap] = decoded(x - 2, y, z);
+        taps[second_above_tap] = decoded(x, y - 2, z);
+        taps[second_behind_tap] = decoded(x, y, z - 2);
+        const double origin = taps[static_cast<size_t>(rest)];
+        double least = 0, greatest = 0;
+        for (int t = 0; t < tap_count; ++t) {
+          double& tap = taps[static_cast<size_t>(t)];
+          tap = has_tap(voxel_class, t) ? tap - origin : 0;
+          least = std::min(least, tap);
+          greatest = std::max(greatest, tap);
+        }
+        const double range = greatest - least, weight = quiet_ / (quiet_ + range * range);
+        const double target = static_cast<double>(page.samples[at] >> shift_) - origin;
+        Equations& sums = all[static_cast<size_t>(voxel_class)];
+        sums.weight += weight;
+        if (range == 0) continue;
+        for (size_t i = 0; i < tap_count; ++i) {
+          const double weighted = weight * taps[i];
+          sums.targets[i] += weighted * target;
+          for (size_t j = i; j < tap_count; ++j) sums.products[i][j] += weighted * taps[j];
+        }
+      }
+}
+
+std::array<Weights, class_count> Fit::weights() const {
+  std::array<Weights, class_count> weights{};
+  for (int c = 0; c < class_count; ++c)
+    weights[static_cast<size_t>(c)] = solve(equations_[static_cast<size_t>(c)], c);
+  return weights;
+}
+
+Weights Fit::solve(const Equations& equations, int voxel_class) {
   Weights weights{};
   const int rest = rest_tap(voxel_class);
   if (rest < 0) return weights;
@@ -57,20 +120,18 @@ Weights weights_of(const Equations& equations, int voxel_class, double noise) {
     if (t != rest && has_tap(voxel_class, t)) taps[n++] = static_cast<size_t>(t);
   if (n == 0 || equations.weight == 0) return weights;
 
-  std::array<std::array<double, tap_count>, tap_count> a;
-  std::array<double, tap_count> b;
-  // The noise of two taps' differences from a third: twice that of one, and once in common.
-  const double common = noise * static_cast<double>(equations.weight);
+  std::array<Row, tap_count> a;
+  Row b;
   for (size_t i = 0; i < n; ++i) {
     for (size_t j = 0; j <= i; ++j) {
       const auto [row, column] = std::minmax(taps[i], taps[j]);
-      a[i][j] = static_cast<double>(equations.products[row][column]) + common + (i == j ? common : 0);
+      a[i][j] = equations.products[row][column];
     }
     // Differences that hardly occur have no weight.
-    a[i][i] += a[i][i] / 4096 + static_cast<double>(equations.weight) / 64 + 1;
-    b[i] = static_cast<double>(equations.targets[taps[i]]) + common;
+    a[i][i] += a[i][i] / 4096 + equations.weight / 1024 + 1e-3;
+    b[i] = equations.targets[taps[i]];
   }
-  if (!solve(a, b, n)) return weights;
+  if (!solve_definite(a, b, n)) return weights;
   int32_t left = weight_one, size = 0;
   Weights fitted{};
   for (size_t i = 0; i < n; ++i) {
@@ -83,64 +144,6 @@ Weights weights_of(const Equations& equations, int voxel_class, double noise) {
   if (std::abs(left) > INT16_MAX || size + std::abs(left) > most_weight) return weights;
   fitted[static_cast<size_t>(rest)] = static_cast<int16_t>(left);
   return fitted;
-}
-
-}  // namespace
-
-std::array<Weights, class_count> fit_weights(std::span<const FitPage> pages, double noise) {
-  uint32_t greatest = 0;
-  for (const FitPage& page : pages)
-    for (const uint32_t sample : page.samples) greatest = std::max(greatest, sample);
-  // Weights need no more than 20 bits of a sample.
-  const int shift = std::max(0, static_cast<int>(std::bit_width(greatest)) - 20);
-  for (int i = 0; i < shift; ++i) noise /= 4;
-
-  std::vector<Equations> equations(class_count);
-  for (const FitPage& page : pages) {
-    const Extent e = page.extent;
-    const auto sample = [&](int x, int y, int z) {
-      const int cx = std::clamp(x, 0, e.nx - 1), cy = std::clamp(y, 0, e.ny - 1), cz = std::clamp(z, 0, e.nz - 1);
-      return static_cast<int64_t>(page.decoded[static_cast<size_t>((cz * e.ny + cy) * e.nx + cx)] >> shift);
-    };
-    size_t at = 0;
-    for (int z = 0; z < e.nz; ++z)
-      for (int y = 0; y < e.ny; ++y)
-        for (int x = 0; x < e.nx; ++x, ++at) {
-          const int voxel_class = class_of(place(x, e.nx), place(y, e.ny), z > 0);
-          const int rest = rest_tap(voxel_class);
-          if (rest < 0) continue;
-          std::array<int64_t, tap_count> taps;
-          std::array<size_t, tap_count> used;
-          size_t n = 0;
-          for (int t = 0; t < tap_count; ++t) {
-            if (!has_tap(voxel_class, t)) continue;
-            taps[static_cast<size_t>(t)] = t == left_tap ? sample(x - 1, y, z)
-                                           : t >= 9      ? sample(x + t - 10, y - 1, z)
-                                                         : sample(x + t % 3 - 1, y + t / 3 - 1, z - 1);
-            used[n++] = static_cast<size_t>(t);
-          }
-          const int64_t origin = taps[static_cast<size_t>(rest)];
-          int64_t least = origin, greatest_tap = origin;
-          for (size_t i = 0; i < n; ++i) {
-            least = std::min(least, taps[used[i]]);
-            greatest_tap = std::max(greatest_tap, taps[used[i]]);
-          }
-          const int64_t weight = equation_weight(greatest_tap - least);
-          if (weight == 0) continue;
-          const int64_t target = static_cast<int64_t>(page.samples[at] >> shift) - origin;
-          Equations& sums = equations[static_cast<size_t>(voxel_class)];
-          sums.weight += weight;
-          for (size_t i = 0; i < n; ++i) {
-            const int64_t weighted = weight * (taps[used[i]] - origin);
-            sums.targets[used[i]] += weighted * target;
-            for (size_t j = i; j < n; ++j) sums.products[used[i]][used[j]] += weighted * (taps[used[j]] - origin);
-          }
-        }
-  }
-  std::array<Weights, class_count> weights{};
-  for (int c = 0; c < class_count; ++c)
-    weights[static_cast<size_t>(c)] = weights_of(equations[static_cast<size_t>(c)], c, noise);
-  return weights;
 }
 
 }  // namespace voxkit::page

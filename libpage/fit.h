@@ -1,6 +1,7 @@
-// Weights of the prediction from sample pages.
+// Weights of the prediction from sample pages, by least squares.
 #pragma once
 
+#include <array>
 #include <cstdint>
 #include <span>
 #include <vector>
@@ -9,16 +10,40 @@
 
 namespace voxkit::page {
 
-/// A page to learn from: what is to be predicted, and what the decoder will have in its place.
+/// A page to learn from: what is to be predicted, and what the decoder has in its place.
 struct FitPage {
   Extent extent;
   std::span<const uint32_t> samples;
   std::span<const uint32_t> decoded;
 };
 
-/// The weights of least squared error for each class; each equation counts the less, the further apart its
-/// taps are. `noise` is the variance that the quantiser will add to the decoded samples (Wiener): 0 where
-/// they have it already.
-std::array<Weights, class_count> fit_weights(std::span<const FitPage> pages, double noise);
+/// Normal equations of all classes. Sums are of doubles, in the order of pages and voxels: nothing else
+/// changes them.
+class Fit {
+ public:
+  /// Samples are at most `greatest`; the quantiser's bound is `max_error`.
+  Fit(uint32_t greatest, uint32_t max_error);
+  /// One equation for each voxel; it counts the less, the further apart its taps are. What was added before
+  /// counts half. `noise` is the variance that the quantiser will add to what is given as decoded (Wiener):
+  /// 0 where that has it already.
+  void add(std::span<const FitPage> pages, double noise);
+  /// The weights of least squared error for each class.
+  std::array<Weights, class_count> weights() const;
+
+ private:
+  using Row = std::array<double, tap_count>;
+  /// In differences from the class's rest tap.
+  struct Equations {
+    std::array<Row, tap_count> products{};  ///< of taps i <= j
+    Row targets{};
+    double weight = 0;
+  };
+  void add_page(const FitPage& page, std::vector<Equations>& sums) const;
+  static Weights solve(const Equations& equations, int voxel_class);
+
+  int shift_;        ///< of samples
+  double quiet_;     ///< the squared range of taps at which an equation counts half
+  std::vector<Equations> equations_;
+};
 
 }  // namespace voxkit::page

@@ -3,6 +3,7 @@
 
 #include "libpage/model_data.h"
 #include "libpage/page.h"
+#include "libpage/row.h"
 
 namespace voxkit::page {
 namespace {
@@ -41,15 +42,11 @@ bool read_weights(BitReader& in, Weights& weights, int voxel_class) {
 }  // namespace
 
 void ModelData::derive() {
-  size_t next = 0;
-  for (uint32_t activity = 0; activity <= most_activity; ++activity) {
-    while (next < thresholds.size() && activity >= thresholds[next]) ++next;
-    step_of[activity] = static_cast<uint8_t>(next);
-  }
-  slots.resize(size_t{context_count} * table_total);
+  half_steps = static_cast<uint32_t>((uint64_t{1} << 15) / step());
+  decoding.resize(context_count);
   for (size_t c = 0; c < context_count; ++c) {
     starts[c] = page::starts(tables[c]);
-    fill_slots(tables[c], std::span<uint32_t, table_total>(slots.data() + c * table_total, table_total));
+    fill_decoding_table(tables[c], wide() ? Wide::escape_bits : Narrow::escape_bits, decoding[c]);
   }
 }
 
@@ -67,11 +64,6 @@ std::vector<std::byte> Model::serialise() const {
     before = m.palette[i] + 1;
   }
   for (int c = 0; c < class_count; ++c) write_weights(out, m.weights[static_cast<size_t>(c)], c);
-  uint32_t threshold = 0;
-  for (const uint16_t next : m.thresholds) {
-    out.golomb(next - threshold, 2);
-    threshold = next;
-  }
   const Frequencies* previous = nullptr;
   for (const Frequencies& table : m.tables) {
     const bool same = previous && table == *previous;
@@ -108,13 +100,6 @@ Result<Model> Model::parse(std::span<const std::byte> bytes) {
   for (int c = 0; c < class_count; ++c)
     if (!read_weights(in, m.weights[static_cast<size_t>(c)], c) || in.overrun())
       return wrong("weights: expected a sum of magnitudes below 16");
-  uint32_t threshold = 0;
-  for (uint16_t& next : m.thresholds) {
-    const uint64_t sum = uint64_t{threshold} + in.golomb(2);
-    if (sum > most_activity || in.overrun()) return wrong("thresholds: expected at most 2040, ascending");
-    next = static_cast<uint16_t>(sum);
-    threshold = next;
-  }
   for (size_t c = 0; c < context_count; ++c) {
     const bool same = in.get(1) != 0;
     if (same && c == 0) return wrong("tables: expected one before that is the same");

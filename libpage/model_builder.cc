@@ -1,4 +1,5 @@
 #include <algorithm>
+#include <bit>
 #include <functional>
 #include <map>
 
@@ -10,6 +11,23 @@ namespace voxkit::page {
 namespace {
 
 using Counts = std::array<uint64_t, symbol_count>;
+
+/// Of fitting to what the fit before led to.
+constexpr int most_rounds = 6;
+
+/// 256 log2(n), rounded down, of whole numbers alone: the same everywhere. 0 of 0.
+uint64_t log2_256(uint64_t n) {
+  if (n == 0) return 0;
+  const auto whole = static_cast<uint64_t>(std::bit_width(n)) - 1;
+  uint64_t mantissa = whole > 31 ? n >> (whole - 31) : n << (31 - whole), result = whole;
+  for (int bit = 0; bit < 8; ++bit) {
+    mantissa = mantissa * mantissa >> 31;
+    const uint64_t carry = mantissa >> 32;
+    mantissa >>= carry;
+    result = 2 * result + carry;
+  }
+  return result;
+}
 
 /// A page as numbers of the model.
 struct Sampled {
@@ -49,29 +67,61 @@ void run(const ModelData& model, const Sampled& page, Residuals& out, uint32_t* 
     find_residuals<Narrow>(model, page.values, page.extent, out, decoded);
 }
 
-/// Tables of what pages consist of with the weights that the model has.
-void fit_tables(ModelData& model, std::vector<Sampled>& pages) {
+/// Codes the pages with the weights that the model has: what their symbols are, and what is decoded.
+std::vector<Counts> count_symbols(const ModelData& model, std::vector<Sampled>& pages) {
   std::vector<Counts> counts(context_count);
   Residuals residuals;
   for (Sampled& page : pages) {
-    if (is_constant(model, page)) continue;
-    page.decoded.resize(page.values.size());
     run(model, page, residuals, page.decoded.data());
     for (size_t i = 0; i < page.values.size(); ++i)
       ++counts[residuals.context[i]][symbol_of(residuals.folded[i])];
   }
-  for (size_t c = 0; c < context_count; ++c) model.tables[c] = normalise(counts[c]);
+  return counts;
 }
 
+/// Bits that symbols take with the best tables, without these, in parts of 256.
+uint64_t cost(const std::vector<Counts>& counts) {
+  uint64_t bits = 0;
+  for (const Counts& table : counts) {
+    uint64_t total = 0;
+    for (uint32_t s = 0; s < symbol_count; ++s) {
+      total += table[s];
+      bits += table[s] * (256 * make_bins(32)[s].raw_bits - log2_256(table[s]));
+    }
+    bits += total * log2_256(total);
+  }
+  return bits;
+}
+
+/// Weights and tables. What is predicted from is what the decoder has, which depends on the weights: they are
+/// fitted again to what those before led to, and the best are kept.
 void fit(ModelData& model, std::vector<Sampled>& pages) {
   model.background = common_value(model, pages);
+  std::erase_if(pages, [&](const Sampled& page) { return is_constant(model, page); });
   const double e = model.max_error;
   std::vector<FitPage> sources;
-  for (const Sampled& page : pages)
-    if (!is_constant(model, page)) sources.push_back({page.extent, page.values, page.values});
-  model.weights = fit_weights(sources, (4 * e * e + 4 * e) / 12);
+  for (Sampled& page : pages) {
+    page.decoded = page.values;
+    sources.push_back({page.extent, page.values, page.decoded});
+  }
   model.derive();
-  fit_tables(model, pages);
+  Fit equations(model.max_value, model.max_error);
+  double noise = (4 * e * e + 4 * e) / 12;
+  std::array<Weights, class_count> best{};
+  std::vector<Counts> best_counts;
+  const int rounds = model.max_error == 0 ? 1 : most_rounds;
+  for (int round = 0; round < rounds; ++round) {
+    equations.add(sources, noise);
+    noise = 0;
+    model.weights = equations.weights();
+    std::vector<Counts> counts = count_symbols(model, pages);
+    if (round == 0 || cost(counts) < cost(best_counts)) {
+      best = model.weights;
+      best_counts = std::move(counts);
+    }
+  }
+  model.weights = best;
+  for (size_t c = 0; c < context_count; ++c) model.tables[c] = normalise(best_counts[c]);
   model.derive();
 }
 

@@ -24,13 +24,12 @@ struct ModelData {
   uint32_t background = 0;  ///< what an empty page stands for, and the prediction of the first voxel
   std::vector<uint32_t> palette;  ///< samples that numbers stand for, ascending; empty: none
   std::array<Weights, class_count> weights{};
-  Thresholds thresholds = default_thresholds;
   std::array<Frequencies, context_count> tables{};
 
   // From these:
-  std::array<uint8_t, most_activity + 1> step_of{};
+  uint32_t half_steps = 0;  ///< 2^15 / step: turns a range into half its steps
   std::array<std::array<uint16_t, symbol_count>, context_count> starts{};
-  std::vector<uint32_t> slots;  ///< of the tables, one after another
+  std::vector<DecodingTable> decoding;
 
   uint64_t step() const { return 2 * uint64_t{max_error} + 1; }
   bool wide() const { return max_value > 0xffff; }

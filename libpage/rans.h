@@ -72,11 +72,12 @@ struct RansDecoder {
     // The bytes before `begin` are looked at even when there is no word left.
     if (page.size() < 4) begin = end = reinterpret_cast<const std::byte*>(no_words) + sizeof no_words;
   }
+  /// Without a branch: whether it is due is as good as random.
   void renew() {
-    const uint64_t next = state << 32 | load_le<uint32_t>(end - sizeof(uint32_t));
-    const bool due = state >> 32 == 0 && end != begin;
-    state = due ? next : state;
-    end -= due ? sizeof(uint32_t) : 0;
+    const auto due = static_cast<uint64_t>((state >> 32 == 0) & (end != begin));
+    const uint64_t word = load_le<uint32_t>(end - sizeof(uint32_t));
+    state = state << (due << 5) | (word & (0 - due));
+    end -= due << 2;
   }
   uint32_t raw(uint32_t raw_bits) {
     const auto value = static_cast<uint32_t>(state & ((uint64_t{1} << raw_bits) - 1));

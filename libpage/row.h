@@ -15,6 +15,12 @@ struct Narrow {
   using Sum = int32_t;
   static constexpr int32_t offset = 32768;
   static constexpr uint32_t escape_bits = 17;
+  /// Half a range in steps of the quantiser, at most 1023.
+  static int range_share(int16_t lowest, int16_t highest, uint32_t half_steps) {
+    const auto range = static_cast<uint16_t>(highest - lowest);
+    const uint32_t share = static_cast<uint32_t>(range) * static_cast<uint16_t>(half_steps) >> 16;
+    return static_cast<int>(std::min(share, 1023u));
+  }
 };
 /// Samples of up to 32 bits.
 struct Wide {
@@ -22,6 +28,9 @@ struct Wide {
   using Sum = int64_t;
   static constexpr int64_t offset = 0;
   static constexpr uint32_t escape_bits = 32;
+  static int range_share(uint32_t lowest, uint32_t highest, uint32_t half_steps) {
+    return static_cast<int>(std::min<uint64_t>(uint64_t{highest - lowest} * half_steps >> 16, 1023));
+  }
 };
 
 /// The part of a page that what comes next depends on.
@@ -33,55 +42,76 @@ struct Memory {
 
 template <class Width>
 struct RowPlan {
-  alignas(64) std::array<typename Width::Sum, max_side> base;  ///< rounded, before the shift
-  std::array<typename Width::Sum, max_side> left_weight;
-  std::array<uint32_t, max_side> context;
+  alignas(64) std::array<typename Width::Sum, max_side> base;  ///< of the predicted sample, before the shift
+  std::array<typename Width::Sum, max_side> left_weight, second_left_weight;
+  std::array<uint16_t, max_side> activity;
+  uint32_t context;  ///< of activity 0
 };
+
+/// Added before the shift, for the nearest whole number; the lower one of two.
+inline constexpr int32_t rounding = weight_one / 2 - 1;
+
+template <class Width, class Rows>
+[[gnu::always_inline]] inline typename Width::Sum base_at(const Weights& w, const Rows& rows, int x) {
+  using Sum = typename Width::Sum;
+  Sum sum = rounding;
+  for (int t = 0; t < left_tap; ++t)
+    sum += static_cast<Sum>(w[static_cast<size_t>(t)]) *
+           static_cast<Sum>(rows[static_cast<size_t>(t / 3)][x + t % 3 - 1]);
+  return sum + static_cast<Sum>(w[second_above_tap]) * static_cast<Sum>(rows[4][x]) +
+         static_cast<Sum>(w[second_behind_tap]) * static_cast<Sum>(rows[5][x]);
+}
 
 template <class Width>
 [[gnu::always_inline]] inline void plan_row(const ModelData& model, Extent extent, int y, int z,
                                             const Memory<Width>& memory, RowPlan<Width>& plan) {
   using Sum = typename Width::Sum;
+  using Stored = typename Width::Stored;
   const auto rows = tap_rows(memory.samples, y, z, extent.ny);
   const int py = place(y, extent.ny);
-  constexpr Sum half = weight_one / 2;
-  {
-    const Weights& w = model.weights[static_cast<size_t>(class_of(inner, py, z > 0))];
-    for (int x = 0; x < max_side; ++x) {
-      Sum sum = half;
-      for (int t = 0; t < left_tap; ++t)
-        sum += static_cast<Sum>(w[static_cast<size_t>(t)]) * static_cast<Sum>(rows[static_cast<size_t>(t / 3)][x + t % 3 - 1]);
-      plan.base[static_cast<size_t>(x)] = sum;
-    }
-    plan.left_weight.fill(w[left_tap]);
-  }
+  const Weights& weights = model.weights[static_cast<size_t>(class_of(inner, py, z > 0))];
+  for (int x = 0; x < max_side; ++x) plan.base[static_cast<size_t>(x)] = base_at<Width>(weights, rows, x);
+  plan.left_weight.fill(weights[left_tap]);
+  plan.second_left_weight.fill(weights[second_left_tap]);
   const auto at_side = [&](int x, int px) {
     const Weights& w = model.weights[static_cast<size_t>(class_of(px, py, z > 0))];
-    Sum sum = half;
-    for (int t = 0; t < left_tap; ++t)
-      sum += static_cast<Sum>(w[static_cast<size_t>(t)]) * static_cast<Sum>(rows[static_cast<size_t>(t / 3)][x + t % 3 - 1]);
-    plan.base[static_cast<size_t>(x)] = sum;
+    plan.base[static_cast<size_t>(x)] = base_at<Width>(w, rows, x);
     plan.left_weight[static_cast<size_t>(x)] = w[left_tap];
+    plan.second_left_weight[static_cast<size_t>(x)] = w[second_left_tap];
   };
   if (extent.nx > 1) at_side(extent.nx - 1, last);
   at_side(0, first);
-  if (y == 0 && z == 0)
-    plan.base[0] = (static_cast<Sum>(model.background) - static_cast<Sum>(Width::offset)) * weight_one + half;
 
-  const int context = first_context(y, z);
-  plan.context.fill(static_cast<uint32_t>(context) * table_total);
-  if (y == 0 && z == 0) return;
-  const auto& now = memory.magnitudes[static_cast<size_t>(z & 1)];
-  const auto& before = memory.magnitudes[static_cast<size_t>(~z & 1)];
-  const uint16_t* above = now[static_cast<size_t>(std::max(y - 1, 0))].data() + row_start;
-  const uint16_t* behind = before[static_cast<size_t>(y)].data() + row_start;
+  plan.context = first_context(y, z);
+  if (y == 0 && z == 0) {
+    plan.base[0] =
+        (static_cast<Sum>(model.background) - static_cast<Sum>(Width::offset)) * weight_one + rounding;
+    plan.activity.fill(0);
+    plan.activity[0] = most_row_activity;
+    return;
+  }
+  const uint16_t* above = row_of(memory.magnitudes, std::max(y - 1, 0), z);
+  const uint16_t* behind = row_of(memory.magnitudes, y, std::max(z - 1, 0));
   if (y == 0) above = behind;
   if (z == 0) behind = above;
-  std::array<uint16_t, max_side> activity;
-  for (int x = 0; x < max_side; ++x)
-    activity[static_cast<size_t>(x)] = static_cast<uint16_t>(2 * (above[x] + behind[x]) + above[x - 1] + above[x + 1] + behind[x - 1] + behind[x + 1]);
-  for (size_t x = 0; x < static_cast<size_t>(extent.nx); ++x)
-    plan.context[x] += uint32_t{model.step_of[activity[x]]} * table_total;
+  // Least and greatest of four rows, then of three neighbours in these.
+  std::array<Stored, row_stride> least, greatest;
+  for (int x = -1; x <= max_side; ++x) {
+    const Stored a = rows[0][x], b = rows[1][x], c = rows[2][x], d = rows[3][x];
+    const Stored low1 = a < b ? a : b, low2 = c < d ? c : d, high1 = a > b ? a : b, high2 = c > d ? c : d;
+    least[static_cast<size_t>(x + row_start)] = low1 < low2 ? low1 : low2;
+    greatest[static_cast<size_t>(x + row_start)] = high1 > high2 ? high1 : high2;
+  }
+  const Stored *low = least.data() + row_start, *high = greatest.data() + row_start;
+  for (int x = 0; x < max_side; ++x) {
+    const Stored low1 = low[x - 1] < low[x + 1] ? low[x - 1] : low[x + 1];
+    const Stored high1 = high[x - 1] > high[x + 1] ? high[x - 1] : high[x + 1];
+    const int magnitudes = 2 * (above[x] + behind[x]) + above[x - 1] + above[x + 1] + behind[x - 1] + behind[x + 1];
+    plan.activity[static_cast<size_t>(x)] = static_cast<uint16_t>(
+        magnitudes +
+        Width::range_share(low1 < low[x] ? low1 : low[x], high1 > high[x] ? high1 : high[x], model.half_steps));
+  }
+  plan.activity[0] = static_cast<uint16_t>(plan.activity[0] + left_share * above[0]);
 }
 
 /// Copies of the ends of a row beside it.
@@ -89,6 +119,29 @@ template <class Stored>
 [[gnu::always_inline]] inline void pad_row(Stored* row, int nx) {
   row[-1] = row[0];
   row[nx] = row[nx - 1];
+}
+
+/// What a voxel's left neighbours add to its plan.
+template <class Width>
+struct Left {
+  int64_t sample = 0, second = 0;
+  uint32_t magnitude = 0;
+};
+
+/// Before the shift.
+template <class Width>
+[[gnu::always_inline]] inline int64_t predict(const RowPlan<Width>& plan, size_t x,
+                                                          const Left<Width>& left) {
+  return plan.base[x] + plan.left_weight[x] * left.sample + plan.second_left_weight[x] * left.second;
+}
+template <class Width>
+[[gnu::always_inline]] inline uint32_t context_at(const RowPlan<Width>& plan, size_t x, const Left<Width>& left) {
+  return plan.context + step_of_activity[plan.activity[x] + left_share * left.magnitude];
+}
+/// All ones where the prediction lies above the whole number next to it: then residuals change their sign, so
+/// that of two small ones the likelier is the first.
+[[gnu::always_inline]] inline uint32_t mirror_of(int64_t mean) {
+  return 0u - (static_cast<uint32_t>(mean) >> (weight_bits - 1) & 1u);
 }
 
 }  // namespace voxkit::page

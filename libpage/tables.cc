@@ -88,10 +88,13 @@ bool read_frequencies(BitReader& in, Frequencies& table) {
   return true;
 }
 
-void fill_slots(const Frequencies& table, std::span<uint32_t, table_total> slots) {
+void fill_decoding_table(const Frequencies& table, uint32_t escape_bits, DecodingTable& out) {
+  const auto bins = make_bins(escape_bits);
   uint32_t slot = 0;
-  for (uint32_t s = 0; s < symbol_count; ++s)
-    for (uint32_t i = 0; i < table[s]; ++i) slots[slot++] = (table[s] - 1u) | i << table_bits | s << (2 * table_bits);
+  for (uint32_t s = 0; s < symbol_count; ++s) {
+    out.word[s] = table[s] | uint64_t{slot} << 12 | uint64_t{bins[s].raw_bits} << 23 | uint64_t{bins[s].base} << 32;
+    for (uint32_t i = 0; i < table[s]; ++i) out.symbol_at[slot++] = static_cast<uint8_t>(s);
+  }
 }
 
 std::array<uint16_t, symbol_count> starts(const Frequencies& table) {

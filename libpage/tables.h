@@ -24,9 +24,13 @@ void write_frequencies(BitWriter& out, const Frequencies& table);
 /// False where what is there is no table.
 bool read_frequencies(BitReader& in, Frequencies& table);
 
-/// One slot for each value of the state's low bits: part - 1 in bits 0..10, place within the symbol's slots
-/// in 11..21, symbol from 22 on.
-void fill_slots(const Frequencies& table, std::span<uint32_t, table_total> slots);
+/// What a decoder needs to know of a symbol, in one word: part in bits 0..11, first slot in 12..22, number of
+/// raw bits in 23..28, base of the folded residual in 32..63.
+struct DecodingTable {
+  std::array<uint8_t, table_total> symbol_at;  ///< for each value of the state's low bits
+  std::array<uint64_t, symbol_count> word;
+};
+void fill_decoding_table(const Frequencies& table, uint32_t escape_bits, DecodingTable& out);
 
 /// First slot of each symbol.
 std::array<uint16_t, symbol_count> starts(const Frequencies& table);
