@@ -42,6 +42,7 @@ def main():
     parser.add_argument("--most", type=int, default=2000)
     parser.add_argument("--only", choices=WORK)
     options = parser.parse_args()
+    options.bin = options.bin.resolve()
     broken = 0
     print("| program | least address space, MB | tried below, each exit 5 |\n| --- | --- | --- |")
     with tempfile.TemporaryDirectory() as folder:
