@@ -34,9 +34,13 @@ Result<const ModuleTable*> load_module(const std::string& folder, const ModuleNe
                             need.package));
   // dlopen counts how often a module is opened; it is never closed, since sources and sinks live in it.
   void* handle = dlopen(path.c_str(), RTLD_NOW | RTLD_LOCAL);
-  if (!handle)
-    return fail(need.missing, {},
-                fmt::format("the {} module cannot be loaded: {}", need.module, loader_error()));
+  if (!handle) {
+    const std::string error = loader_error();
+    const bool no_memory =
+        error.find("annot allocate") != error.npos || error.find("failed to map segment") != error.npos;
+    return fail(no_memory ? ErrorCode::limit : need.missing, {},
+                fmt::format("the {} module cannot be loaded: {}", need.module, error));
+  }
   const auto entry = reinterpret_cast<const ModuleTable* (*)()>(dlsym(handle, "voxkit_module"));
   if (!entry)
     return fail(need.missing, {},

@@ -59,7 +59,7 @@ KINDS = {
     "tiff": (["vox-convert", "membrane:20,12,2:1"], "s-%d.tif", VOLUME),
     "png": (["vox-convert", "membrane:20,12,2:1"], "s-%d.png", VOLUME),
     "exr": (["vox-render", "sphere:16", "--size", "16x12"], "a.exr", [INFO, DIFF, CONVERT]),
-    "vox": (["vox-decode", "@menger.dagc"], "a.vox", SURFACE),
+    "vox": (["vox-decode", "@menger.dagc"], "a.vox", [["dagcolor-pack", "@", "-o", "out.dagc", "-f"]]),
     "ply": (["vox-decode", "@menger.dagc"], "a.ply", SURFACE),
     "dicom": (None, "a.dcm", VOLUME),
 }
@@ -158,7 +158,9 @@ def run(command, folder):
 
 
 def judge(command, code, err, peak, folder):
-    wrong = [line for line in err.splitlines() if not line.startswith(command[0].rsplit("/", 1)[1] + ": ")]
+    tool = command[0].rsplit("/", 1)[1]
+    own = tuple(f"{name}: " for name in (tool, *(command[1:] if code == 0 else ())))  # or of what was done, of a file
+    wrong = [line for line in err.splitlines() if not line.startswith(own)]
     if code not in (0, 1, 3, 5):
         raise Found(f"exit {code}: {err}")
     if wrong:
@@ -180,6 +182,7 @@ def main():
     parser.add_argument("--seed", type=int, default=1)
     parser.add_argument("--kind", choices=sorted(KINDS), help="of one kind alone")
     options = parser.parse_args()
+    options.bin = options.bin.resolve()
     broken = 0
     print("| kind | mutations | runs | taken | refused | over the limit | greatest peak, MiB | longest, s |")
     print("| --- | --- | --- | --- | --- | --- | --- | --- |")
