@@ -92,7 +92,7 @@ void fill_decoding_table(const Frequencies& table, uint32_t escape_bits, Decodin
   const auto bins = make_bins(escape_bits);
   uint32_t slot = 0;
   for (uint32_t s = 0; s < symbol_count; ++s) {
-    out.word[s] = table[s] | uint64_t{slot} << 12 | uint64_t{bins[s].raw_bits} << 23 | uint64_t{bins[s].base} << 32;
+    out.word[s] = bins[s].base | uint64_t{bins[s].raw_bits} << 32 | uint64_t{table[s]} << 40 | uint64_t{slot} << 52;
     for (uint32_t i = 0; i < table[s]; ++i) out.symbol_at[slot++] = static_cast<uint8_t>(s);
   }
 }
