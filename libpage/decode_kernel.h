@@ -40,7 +40,7 @@ template <class Width>
   }
 }
 
-/// Calls `row(lane number, y, z, samples of the row)` for each row of each lane.
+/// Calls `row_out(lane number, samples of the row)` for each row of each lane in order.
 template <class Width, int lane_count, class RowOut>
 [[gnu::always_inline]] inline void decode_lanes(const ModelData& model, Extent extent,
                                                 std::array<Lane<Width>, lane_count>& lanes,
@@ -97,7 +97,7 @@ template <class Width, int lane_count, class RowOut>
       each([&](auto n) __attribute__((always_inline)) {
         pad_row(row[n], extent.nx);
         pad_row(magnitudes[n], extent.nx);
-        row_out(n, y, z, row[n]);
+        row_out(n, row[n]);
       });
     }
   each([&](auto n) __attribute__((always_inline)) { lanes[n].coder = coder[n]; });
