@@ -26,8 +26,7 @@ template <class Width, int lane_count, class T>
   const Extent extent = jobs[0]->extent;
   const uint32_t* const palette = model.palette.empty() ? nullptr : model.palette.data();
   decode_lanes<Width, lane_count>(
-      model, extent, lanes,
-      [&](size_t n, const typename Width::Stored* row) __attribute__((always_inline)) {
+      model, extent, lanes, [&](size_t n, const typename Width::Stored* row) __attribute__((always_inline)) {
         const auto nx = static_cast<size_t>(extent.nx);
         for (size_t x = 0; x < nx; ++x) {
           const uint32_t value = static_cast<uint32_t>(row[x]) + static_cast<uint32_t>(Width::offset);
@@ -84,7 +83,8 @@ bool decode_constant(const ModelData& model, const PageJob<T>& job, bool& whole)
 }
 
 Status damaged() {
-  return bad_input({}, "page: it does not end where its symbols end: expected a page of this model and extent");
+  return bad_input({},
+                   "page: it does not end where its symbols end: expected a page of this model and extent");
 }
 
 template <class T>
@@ -92,7 +92,7 @@ Status decode_all(const Model& shared, std::span<const PageJob<T>> jobs, size_t*
   const ModelData& model = shared.data();
   for (const PageJob<T>& job : jobs) VOX_CHECK(usable(shared, job));
   size_t bad = jobs.size();
-  constexpr size_t group = 4;
+  constexpr size_t group = 2;
   std::array<const PageJob<T>*, group> waiting;
   size_t count = 0;
   const auto judge = [&](const PageJob<T>* job, bool whole) {
@@ -139,13 +139,16 @@ Status decode_one(const Model& model, std::span<const std::byte> page, Extent ex
 
 }  // namespace
 
-Status decode_page(const Model& model, std::span<const std::byte> page, Extent extent, std::span<uint8_t> out) {
+Status decode_page(const Model& model, std::span<const std::byte> page, Extent extent,
+                   std::span<uint8_t> out) {
   return decode_one(model, page, extent, out);
 }
-Status decode_page(const Model& model, std::span<const std::byte> page, Extent extent, std::span<uint16_t> out) {
+Status decode_page(const Model& model, std::span<const std::byte> page, Extent extent,
+                   std::span<uint16_t> out) {
   return decode_one(model, page, extent, out);
 }
-Status decode_page(const Model& model, std::span<const std::byte> page, Extent extent, std::span<uint32_t> out) {
+Status decode_page(const Model& model, std::span<const std::byte> page, Extent extent,
+                   std::span<uint32_t> out) {
   return decode_one(model, page, extent, out);
 }
 Status decode_pages(const Model& model, std::span<const PageJob<uint8_t>> jobs, size_t* failed) {

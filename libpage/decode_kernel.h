@@ -54,7 +54,8 @@ template <class Width, int lane_count, class RowOut>
   const auto each = [](const auto& body) __attribute__((always_inline)) {
     [&]<size_t... n>(std::index_sequence<n...>) __attribute__((always_inline)) {
       (body(std::integral_constant<size_t, n>{}), ...);
-    }(std::make_index_sequence<lane_count>{});
+    }
+    (std::make_index_sequence<lane_count>{});
   };
   std::array<Stored*, lane_count> row;
   std::array<uint16_t*, lane_count> magnitudes;
@@ -74,7 +75,8 @@ template <class Width, int lane_count, class RowOut>
       const auto voxel = [&](size_t n, size_t x) __attribute__((always_inline)) {
         const RowPlan<Width>& plan = lanes[n].plan;
         const auto* table = reinterpret_cast<const DecodingTable*>(
-            table_bytes[n] + size_t{8} * step_of_activity<sizeof(DecodingTable) / 8>[activity_at(plan, x, left[n])]);
+            table_bytes[n] +
+            size_t{8} * step_of_activity<sizeof(DecodingTable) / 8>[activity_at(plan, x, left[n])]);
         const uint32_t folded = decode_folded<Width>(coder[n], *table);
         const int64_t mean = predict(plan, x, left[n]);
         const int64_t predicted = std::clamp(mean >> weight_bits, lowest, highest);
@@ -93,7 +95,8 @@ template <class Width, int lane_count, class RowOut>
         voxel(n, 0);
         left[n].second = left[n].sample;
       });
-      for (size_t x = 1; x < static_cast<size_t>(extent.nx); ++x) each([&](auto n) __attribute__((always_inline)) { voxel(n, x); });
+      for (size_t x = 1; x < static_cast<size_t>(extent.nx); ++x)
+        each([&](auto n) __attribute__((always_inline)) { voxel(n, x); });
       each([&](auto n) __attribute__((always_inline)) {
         pad_row(row[n], extent.nx);
         pad_row(magnitudes[n], extent.nx);

@@ -36,7 +36,8 @@ void find_residuals(const ModelData& model, std::span<const uint32_t> samples, E
       uint16_t* magnitudes = row_of(memory.magnitudes, y, z);
       Left<Width> left;
       for (size_t x = 0; x < static_cast<size_t>(extent.nx); ++x, ++at) {
-        out.context[at] = static_cast<uint8_t>(plan.context + step_of_activity<1>[activity_at(plan, x, left)]);
+        out.context[at] =
+            static_cast<uint8_t>(plan.context + step_of_activity<1>[activity_at(plan, x, left)]);
         const int64_t mean = predict(plan, x, left);
         const int64_t predicted = std::clamp(mean >> weight_bits, lowest, highest);
         const int64_t value = int64_t{samples[at]} - Width::offset;

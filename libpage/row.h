@@ -107,8 +107,8 @@ template <class Width>
     const Stored low1 = low[x - 1] < low[x + 1] ? low[x - 1] : low[x + 1];
     const Stored high1 = high[x - 1] > high[x + 1] ? high[x - 1] : high[x + 1];
     const Stored lowest = low1 < low[x] ? low1 : low[x], highest = high1 > high[x] ? high1 : high[x];
-    const int activity = 2 * (above[x] + behind[x]) + above[x - 1] + above[x + 1] + behind[x - 1] + behind[x + 1] +
-                         Width::range_share(lowest, highest, model.half_steps);
+    const int activity = 2 * (above[x] + behind[x]) + above[x - 1] + above[x + 1] + behind[x - 1] +
+                         behind[x + 1] + Width::range_share(lowest, highest, model.half_steps);
     plan.activity[static_cast<size_t>(x)] = static_cast<uint16_t>(std::min(activity, most_row_activity));
   }
   plan.activity[0] = static_cast<uint16_t>(
@@ -131,12 +131,12 @@ struct Left {
 
 /// Before the shift.
 template <class Width>
-[[gnu::always_inline]] inline int64_t predict(const RowPlan<Width>& plan, size_t x,
-                                                          const Left<Width>& left) {
+[[gnu::always_inline]] inline int64_t predict(const RowPlan<Width>& plan, size_t x, const Left<Width>& left) {
   return plan.base[x] + plan.left_weight[x] * left.sample + plan.second_left_weight[x] * left.second;
 }
 template <class Width>
-[[gnu::always_inline]] inline uint32_t activity_at(const RowPlan<Width>& plan, size_t x, const Left<Width>& left) {
+[[gnu::always_inline]] inline uint32_t activity_at(const RowPlan<Width>& plan, size_t x,
+                                                   const Left<Width>& left) {
   return plan.activity[x] + left_share * left.magnitude;
 }
 /// 1 where the prediction lies above the whole number next to it: then the first of two small residuals of

@@ -16,7 +16,8 @@ inline constexpr uint32_t symbol_count = escape_symbol + 1;
 
 /// 0, -1, 1, -2, 2 … become 0, 1, 2, 3, 4 …; mirrored: 0, 1, -1, 2, -2 …
 constexpr uint32_t fold(int32_t residual, uint32_t mirror) {
-  const auto bits = static_cast<uint32_t>(mirror ? 0u - static_cast<uint32_t>(residual) : static_cast<uint32_t>(residual));
+  const auto bits =
+      static_cast<uint32_t>(mirror ? 0u - static_cast<uint32_t>(residual) : static_cast<uint32_t>(residual));
   return bits << 1 ^ (0u - (bits >> 31));
 }
 /// |residual|, 0..2^31.

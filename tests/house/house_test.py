@@ -19,6 +19,7 @@ formats           ->
 formats/image     -> formats
 formats/mesh      -> formats formats/image
 formats/volume    -> formats formats/image
+libpage           -> formats
 libsvmm           -> formats formats/volume
 libvq             -> formats formats/volume
 libcolor/surface  -> formats formats/mesh
