@@ -1,6 +1,7 @@
 #include <algorithm>
 #include <limits>
 
+#include "formats/cpu.h"
 #include "libpage/decode_kernel.h"
 #include "libpage/page.h"
 
@@ -14,7 +15,8 @@ T sample_of(const ModelData& model, uint32_t value) {
 
 /// Pages of one extent, all of them with residuals.
 template <class Width, int lane_count, class T>
-void decode_group(const ModelData& model, const PageJob<T>* const* jobs, bool* whole) {
+[[gnu::always_inline]] inline void decode_group_body(const ModelData& model, const PageJob<T>* const* jobs,
+                                                     bool* whole) {
   std::array<Lane<Width>, lane_count> lanes;
   std::array<T*, lane_count> out;
   for (size_t n = 0; n < lane_count; ++n) {
@@ -22,20 +24,37 @@ void decode_group(const ModelData& model, const PageJob<T>* const* jobs, bool* w
     out[n] = jobs[n]->out.data();
   }
   const Extent extent = jobs[0]->extent;
+  const uint32_t* const palette = model.palette.empty() ? nullptr : model.palette.data();
   decode_lanes<Width, lane_count>(
-      model, extent, lanes, [&](size_t n, int, int, const typename Width::Stored* row) {
+      model, extent, lanes, [&](size_t n, const typename Width::Stored* row) __attribute__((always_inline)) {
         const auto nx = static_cast<size_t>(extent.nx);
-        if (model.palette.empty()) {
-          for (size_t x = 0; x < nx; ++x)
-            out[n][x] = static_cast<T>(static_cast<uint32_t>(row[x]) + static_cast<uint32_t>(Width::offset));
-        } else {
-          for (size_t x = 0; x < nx; ++x)
-            out[n][x] = static_cast<T>(
-                model.palette[static_cast<uint32_t>(row[x]) + static_cast<uint32_t>(Width::offset)]);
+        for (size_t x = 0; x < nx; ++x) {
+          const uint32_t value = static_cast<uint32_t>(row[x]) + static_cast<uint32_t>(Width::offset);
+          out[n][x] = static_cast<T>(palette ? palette[value] : value);
         }
         out[n] += nx;
       });
   for (size_t n = 0; n < lane_count; ++n) whole[n] = lanes[n].coder.finished();
+}
+
+template <class Width, int lane_count, class T>
+void decode_group_anywhere(const ModelData& model, const PageJob<T>* const* jobs, bool* whole) {
+  decode_group_body<Width, lane_count>(model, jobs, whole);
+}
+#ifdef VOXKIT_AVX2
+template <class Width, int lane_count, class T>
+VOXKIT_AVX2_CODE void decode_group_avx2(const ModelData& model, const PageJob<T>* const* jobs, bool* whole) {
+  decode_group_body<Width, lane_count>(model, jobs, whole);
+}
+#endif
+
+/// The same on every machine, and as fast as it can.
+template <class Width, int lane_count, class T>
+void decode_group(const ModelData& model, const PageJob<T>* const* jobs, bool* whole) {
+#ifdef VOXKIT_AVX2
+  if (has_avx2()) return decode_group_avx2<Width, lane_count>(model, jobs, whole);
+#endif
+  decode_group_anywhere<Width, lane_count>(model, jobs, whole);
 }
 
 template <class T>
@@ -64,7 +83,8 @@ bool decode_constant(const ModelData& model, const PageJob<T>& job, bool& whole)
 }
 
 Status damaged() {
-  return bad_input({}, "page: it does not end where its symbols end: expected a page of this model and extent");
+  return bad_input({},
+                   "page: it does not end where its symbols end: expected a page of this model and extent");
 }
 
 template <class T>
@@ -72,7 +92,7 @@ Status decode_all(const Model& shared, std::span<const PageJob<T>> jobs, size_t*
   const ModelData& model = shared.data();
   for (const PageJob<T>& job : jobs) VOX_CHECK(usable(shared, job));
   size_t bad = jobs.size();
-  constexpr size_t group = 4;
+  constexpr size_t group = 2;
   std::array<const PageJob<T>*, group> waiting;
   size_t count = 0;
   const auto judge = [&](const PageJob<T>* job, bool whole) {
@@ -119,13 +139,16 @@ Status decode_one(const Model& model, std::span<const std::byte> page, Extent ex
 
 }  // namespace
 
-Status decode_page(const Model& model, std::span<const std::byte> page, Extent extent, std::span<uint8_t> out) {
+Status decode_page(const Model& model, std::span<const std::byte> page, Extent extent,
+                   std::span<uint8_t> out) {
   return decode_one(model, page, extent, out);
 }
-Status decode_page(const Model& model, std::span<const std::byte> page, Extent extent, std::span<uint16_t> out) {
+Status decode_page(const Model& model, std::span<const std::byte> page, Extent extent,
+                   std::span<uint16_t> out) {
   return decode_one(model, page, extent, out);
 }
-Status decode_page(const Model& model, std::span<const std::byte> page, Extent extent, std::span<uint32_t> out) {
+Status decode_page(const Model& model, std::span<const std::byte> page, Extent extent,
+                   std::span<uint32_t> out) {
   return decode_one(model, page, extent, out);
 }
 Status decode_pages(const Model& model, std::span<const PageJob<uint8_t>> jobs, size_t* failed) {

@@ -41,7 +41,8 @@ Status encode(const Model& shared, std::span<const T> samples, Extent extent, st
     for (size_t i = 0; i < samples.size(); ++i) {
       const auto at = std::ranges::lower_bound(model.palette, samples[i]);
       if (at == model.palette.end() || *at != samples[i])
-        return bad_usage("a sample that the palette of the model lacks: expected all values when it was made");
+        return bad_usage(
+            "a sample that the palette of the model lacks: expected all values when it was made");
       values[i] = static_cast<uint32_t>(at - model.palette.begin());
     }
   }

@@ -36,7 +36,8 @@ void find_residuals(const ModelData& model, std::span<const uint32_t> samples, E
       uint16_t* magnitudes = row_of(memory.magnitudes, y, z);
       Left<Width> left;
       for (size_t x = 0; x < static_cast<size_t>(extent.nx); ++x, ++at) {
-        out.context[at] = static_cast<uint8_t>(context_at(plan, x, left));
+        out.context[at] =
+            static_cast<uint8_t>(plan.context + step_of_activity<1>[activity_at(plan, x, left)]);
         const int64_t mean = predict(plan, x, left);
         const int64_t predicted = std::clamp(mean >> weight_bits, lowest, highest);
         const int64_t value = int64_t{samples[at]} - Width::offset;
@@ -48,9 +49,7 @@ void find_residuals(const ModelData& model, std::span<const uint32_t> samples, E
           decoded_value = std::clamp(predicted + residual * step, lowest, highest);
         }
         // Lossless ones of 32 bits count modulo 2^32.
-        const uint32_t mirror = mirror_of(mean);
-        const uint32_t folded =
-            fold(static_cast<int32_t>((static_cast<uint32_t>(residual) ^ mirror) - mirror));
+        const uint32_t folded = fold(static_cast<int32_t>(static_cast<uint32_t>(residual)), mirror_of(mean));
         left.second = x == 0 ? decoded_value : left.sample;
         left.sample = decoded_value;
         left.magnitude = std::min(magnitude(folded), most_magnitude);

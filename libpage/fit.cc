@@ -9,8 +9,8 @@ namespace {
 
 /// Solves a x = b for a symmetric positive definite matrix by its Cholesky factors, in one order of
 /// operations. False where it is not definite.
-bool solve_definite(std::array<std::array<double, tap_count>, tap_count>& a, 
-                    std::array<double, tap_count>& b, size_t n) {
+bool solve_definite(std::array<std::array<double, tap_count>, tap_count>& a, std::array<double, tap_count>& b,
+                    size_t n) {
   for (size_t i = 0; i < n; ++i) {
     for (size_t j = 0; j <= i; ++j) {
       double sum = a[i][j];
@@ -53,7 +53,8 @@ void Fit::add(std::span<const FitPage> pages, double noise) {
     const double common = noise * sums[c].weight;
     for (size_t i = 0; i < tap_count; ++i) {
       for (size_t j = i; j < tap_count; ++j)
-        total.products[i][j] = total.products[i][j] / 2 + sums[c].products[i][j] + common + (i == j ? common : 0);
+        total.products[i][j] =
+            total.products[i][j] / 2 + sums[c].products[i][j] + common + (i == j ? common : 0);
       total.targets[i] = total.targets[i] / 2 + sums[c].targets[i] + common;
     }
     total.weight = total.weight / 2 + sums[c].weight;
@@ -75,7 +76,8 @@ void Fit::add_page(const FitPage& page, std::vector<Equations>& all) const {
         if (rest < 0) continue;
         Row taps{};
         for (int dy = -1; dy <= 1; ++dy)
-          for (int dx = -1; dx <= 1; ++dx) taps[static_cast<size_t>(3 * dy + dx + 4)] = decoded(x + dx, y + dy, z - 1);
+          for (int dx = -1; dx <= 1; ++dx)
+            taps[static_cast<size_t>(3 * dy + dx + 4)] = decoded(x + dx, y + dy, z - 1);
         for (int dx = -1; dx <= 1; ++dx) taps[static_cast<size_t>(dx + 10)] = decoded(x + dx, y - 1, z);
         taps[left_tap] = decoded(x - 1, y, z);
         taps[second_left_tap] = decoded(x - 2, y, z);

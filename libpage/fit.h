@@ -41,8 +41,8 @@ class Fit {
   void add_page(const FitPage& page, std::vector<Equations>& sums) const;
   static Weights solve(const Equations& equations, int voxel_class);
 
-  int shift_;        ///< of samples
-  double quiet_;     ///< the squared range of taps at which an equation counts half
+  int shift_;     ///< of samples
+  double quiet_;  ///< the squared range of taps at which an equation counts half
   std::vector<Equations> equations_;
 };
 

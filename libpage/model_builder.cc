@@ -1,6 +1,7 @@
 #include <algorithm>
 #include <bit>
 #include <functional>
+#include <limits>
 #include <map>
 
 #include "libpage/encode_kernel.h"
@@ -127,14 +128,19 @@ void fit(ModelData& model, std::vector<Sampled>& pages) {
 
 }  // namespace
 
-void ModelBuilder::add(std::span<const uint8_t> samples, Extent extent) {
+template <class T>
+void ModelBuilder::keep(std::span<const T> samples, Extent extent) {
   pages_.push_back({extent, {samples.begin(), samples.end()}});
+  type_max_ = std::max<uint32_t>(type_max_, std::numeric_limits<T>::max());
+}
+void ModelBuilder::add(std::span<const uint8_t> samples, Extent extent) {
+  keep(samples, extent);
 }
 void ModelBuilder::add(std::span<const uint16_t> samples, Extent extent) {
-  pages_.push_back({extent, {samples.begin(), samples.end()}});
+  keep(samples, extent);
 }
 void ModelBuilder::add(std::span<const uint32_t> samples, Extent extent) {
-  pages_.push_back({extent, {samples.begin(), samples.end()}});
+  keep(samples, extent);
 }
 
 namespace {
@@ -163,26 +169,28 @@ bool number(std::span<const uint32_t> palette, std::vector<uint32_t>& samples) {
 
 Result<Model> ModelBuilder::build(const ModelOptions& options) const {
   const std::vector<uint32_t>& values = options.values;
+  const uint32_t max_sample = pages_.empty() ? options.max_sample : std::min(options.max_sample, type_max_);
   if (options.max_error > most_error) return bad_usage("page model: expected an error bound below 2^31");
-  if (values.size() > most_palette || std::ranges::adjacent_find(values, std::ranges::greater_equal()) != values.end())
+  if (values.size() > most_palette ||
+      std::ranges::adjacent_find(values, std::ranges::greater_equal()) != values.end())
     return bad_usage("page model: expected at most 65536 values, ascending");
-  if (!values.empty() && values.back() > options.max_sample)
-    return bad_usage("page model: a value above max_sample");
+  if (!values.empty() && values.back() > max_sample) return bad_usage("page model: a value above max_sample");
   for (const Page& page : pages_) {
     if (!page.extent.valid() || page.samples.size() != static_cast<size_t>(page.extent.voxels()))
       return bad_usage("page model: a page of another number of samples than its extent");
-    if (*std::ranges::max_element(page.samples) > options.max_sample)
+    if (*std::ranges::max_element(page.samples) > max_sample)
       return bad_usage("page model: a sample above max_sample");
   }
   const auto fitted = [&](const std::vector<uint32_t>& palette) -> Result<Model> {
     auto made = std::make_shared<ModelData>();
     made->max_error = options.max_error;
-    made->max_value = palette.empty() ? options.max_sample : static_cast<uint32_t>(palette.size() - 1);
+    made->max_value = palette.empty() ? max_sample : static_cast<uint32_t>(palette.size() - 1);
     made->palette = palette;
     std::vector<Sampled> pages;
     for (const Page& page : pages_) {
       pages.push_back({page.extent, page.samples, {}});
-      if (!number(palette, pages.back().values)) return bad_usage("page model: a sample that is none of the values");
+      if (!number(palette, pages.back().values))
+        return bad_usage("page model: a sample that is none of the values");
     }
     fit(*made, pages);
     return Model(std::move(made));

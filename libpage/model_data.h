@@ -19,9 +19,9 @@ inline constexpr uint32_t most_error = 0x7fffffff;
 inline constexpr size_t most_palette = 65536;
 
 struct ModelData {
-  uint32_t max_value = 0;   ///< of samples, or of numbers of palette entries
-  uint32_t max_error = 0;   ///< E
-  uint32_t background = 0;  ///< what an empty page stands for, and the prediction of the first voxel
+  uint32_t max_value = 0;         ///< of samples, or of numbers of palette entries
+  uint32_t max_error = 0;         ///< E
+  uint32_t background = 0;        ///< what an empty page stands for, and the prediction of the first voxel
   std::vector<uint32_t> palette;  ///< samples that numbers stand for, ascending; empty: none
   std::array<Weights, class_count> weights{};
   std::array<Frequencies, context_count> tables{};

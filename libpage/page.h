@@ -41,7 +41,7 @@ class Model {
 struct ModelOptions {
   /// No decoded sample is further from its original than this; 0: all are equal. At most 2^31 - 1.
   uint32_t max_error = 0;
-  /// The greatest sample that any page will have. Less than a type can hold is a little smaller.
+  /// The greatest sample that any page will have, if the type of the samples could hold more.
   uint32_t max_sample = 0xffffffff;
   /// All values that samples of any page have, ascending, at most 65536 of them; or empty. The model has a
   /// palette of them where that is smaller, and the bound is 0.
@@ -65,7 +65,10 @@ class ModelBuilder {
   };
 
  private:
+  template <class T>
+  void keep(std::span<const T> samples, Extent extent);
   std::vector<Page> pages_;
+  uint32_t type_max_ = 0;  ///< of the widest type of samples
 };
 
 /// Appends the bytes of a page to `out`: none where all samples are within the bound of the background. They
@@ -81,9 +84,12 @@ Status encode_page(const Model& model, std::span<const uint32_t> samples, Extent
 /// Decodes a page of exactly these bytes into `extent.voxels()` samples. Safe on any bytes: it touches
 /// nothing else, and damage that shows is ErrorCode::input; what was written by then is undefined.
 /// ErrorCode::usage where the type is too narrow for the model, or `out` is not of that size.
-Status decode_page(const Model& model, std::span<const std::byte> page, Extent extent, std::span<uint8_t> out);
-Status decode_page(const Model& model, std::span<const std::byte> page, Extent extent, std::span<uint16_t> out);
-Status decode_page(const Model& model, std::span<const std::byte> page, Extent extent, std::span<uint32_t> out);
+Status decode_page(const Model& model, std::span<const std::byte> page, Extent extent,
+                   std::span<uint8_t> out);
+Status decode_page(const Model& model, std::span<const std::byte> page, Extent extent,
+                   std::span<uint16_t> out);
+Status decode_page(const Model& model, std::span<const std::byte> page, Extent extent,
+                   std::span<uint32_t> out);
 
 /// One of several pages to decode.
 template <class T>

@@ -11,8 +11,8 @@
 namespace voxkit::page {
 
 /// 0..8: of the plane before, row y + t / 3 - 1, voxel x + t % 3 - 1; 9..11: of the row before, voxel
-/// x + t - 10; 12: the voxel before; 13, 14, 15: the second before, above and behind, or where that is outside
-/// the page, the first.
+/// x + t - 10; 12: the voxel before; 13, 14, 15: the second before, above and behind, or where that is
+/// outside the page, the first.
 inline constexpr int tap_count = 16;
 inline constexpr int left_tap = 12, second_left_tap = 13, second_above_tap = 14, second_behind_tap = 15;
 inline constexpr int weight_bits = 12;
@@ -71,8 +71,8 @@ template <class Stored>
 /// then the second above and the second behind. In place of rows outside the page there are the nearest of
 /// the same plane, or else of the other one; the first row of all has none.
 template <class Stored>
-[[gnu::always_inline]] inline std::array<const Stored*, 6> tap_rows(const Planes<Stored>& planes, int y, int z,
-                                                                    int ny) {
+[[gnu::always_inline]] inline std::array<const Stored*, 6> tap_rows(const Planes<Stored>& planes, int y,
+                                                                    int z, int ny) {
   const int up = std::max(y - 1, 0), behind = std::max(z - 1, 0);
   const Stored* above = y > 0 ? row_of(planes, y - 1, z) : row_of(planes, y, behind);
   if (z == 0) return {above, above, above, above, row_of(planes, std::max(y - 2, 0), z), above};

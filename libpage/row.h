@@ -106,12 +106,13 @@ template <class Width>
   for (int x = 0; x < max_side; ++x) {
     const Stored low1 = low[x - 1] < low[x + 1] ? low[x - 1] : low[x + 1];
     const Stored high1 = high[x - 1] > high[x + 1] ? high[x - 1] : high[x + 1];
-    const int magnitudes = 2 * (above[x] + behind[x]) + above[x - 1] + above[x + 1] + behind[x - 1] + behind[x + 1];
-    plan.activity[static_cast<size_t>(x)] = static_cast<uint16_t>(
-        magnitudes +
-        Width::range_share(low1 < low[x] ? low1 : low[x], high1 > high[x] ? high1 : high[x], model.half_steps));
+    const Stored lowest = low1 < low[x] ? low1 : low[x], highest = high1 > high[x] ? high1 : high[x];
+    const int activity = 2 * (above[x] + behind[x]) + above[x - 1] + above[x + 1] + behind[x - 1] +
+                         behind[x + 1] + Width::range_share(lowest, highest, model.half_steps);
+    plan.activity[static_cast<size_t>(x)] = static_cast<uint16_t>(std::min(activity, most_row_activity));
   }
-  plan.activity[0] = static_cast<uint16_t>(plan.activity[0] + left_share * above[0]);
+  plan.activity[0] = static_cast<uint16_t>(
+      std::min<uint32_t>(plan.activity[0] + left_share * above[0], uint32_t{most_row_activity}));
 }
 
 /// Copies of the ends of a row beside it.
@@ -130,18 +131,18 @@ struct Left {
 
 /// Before the shift.
 template <class Width>
-[[gnu::always_inline]] inline int64_t predict(const RowPlan<Width>& plan, size_t x,
-                                                          const Left<Width>& left) {
+[[gnu::always_inline]] inline int64_t predict(const RowPlan<Width>& plan, size_t x, const Left<Width>& left) {
   return plan.base[x] + plan.left_weight[x] * left.sample + plan.second_left_weight[x] * left.second;
 }
 template <class Width>
-[[gnu::always_inline]] inline uint32_t context_at(const RowPlan<Width>& plan, size_t x, const Left<Width>& left) {
-  return plan.context + step_of_activity[plan.activity[x] + left_share * left.magnitude];
+[[gnu::always_inline]] inline uint32_t activity_at(const RowPlan<Width>& plan, size_t x,
+                                                   const Left<Width>& left) {
+  return plan.activity[x] + left_share * left.magnitude;
 }
-/// All ones where the prediction lies above the whole number next to it: then residuals change their sign, so
-/// that of two small ones the likelier is the first.
+/// 1 where the prediction lies above the whole number next to it: then the first of two small residuals of
+/// equal size is the positive one, as it is the likelier.
 [[gnu::always_inline]] inline uint32_t mirror_of(int64_t mean) {
-  return 0u - (static_cast<uint32_t>(mean) >> (weight_bits - 1) & 1u);
+  return static_cast<uint32_t>(mean) >> (weight_bits - 1) & 1u;
 }
 
 }  // namespace voxkit::page

@@ -14,16 +14,19 @@ inline constexpr uint32_t direct_symbols = 16;
 inline constexpr uint32_t escape_symbol = direct_symbols + 2 * (32 - 4);
 inline constexpr uint32_t symbol_count = escape_symbol + 1;
 
-/// 0, -1, 1, -2, 2 … become 0, 1, 2, 3, 4 …
-constexpr uint32_t fold(int32_t residual) {
-  return static_cast<uint32_t>(residual) << 1 ^ static_cast<uint32_t>(residual >> 31);
-}
-constexpr int32_t unfold(uint32_t folded) {
-  return static_cast<int32_t>(folded >> 1 ^ (0u - (folded & 1)));
+/// 0, -1, 1, -2, 2 … become 0, 1, 2, 3, 4 …; mirrored: 0, 1, -1, 2, -2 …
+constexpr uint32_t fold(int32_t residual, uint32_t mirror) {
+  const auto bits =
+      static_cast<uint32_t>(mirror ? 0u - static_cast<uint32_t>(residual) : static_cast<uint32_t>(residual));
+  return bits << 1 ^ (0u - (bits >> 31));
 }
 /// |residual|, 0..2^31.
 constexpr uint32_t magnitude(uint32_t folded) {
   return (folded >> 1) + (folded & 1);
+}
+/// All ones where the residual is negative.
+constexpr int64_t sign(uint32_t folded, uint32_t mirror) {
+  return -static_cast<int64_t>((folded ^ mirror) & 1);
 }
 
 constexpr uint32_t symbol_of(uint32_t folded) {

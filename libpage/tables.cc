@@ -28,8 +28,8 @@ Frequencies normalise(const std::array<uint64_t, symbol_count>& counts) {
   uint32_t given = 0;
   for (uint32_t s = 0; s < symbol_count; ++s)
     if (kept[s] != 0) {
-      table[s] = static_cast<uint16_t>(
-          std::max<uint64_t>(1, (kept[s] * table_total + kept_total / 2) / kept_total));
+      table[s] =
+          static_cast<uint16_t>(std::max<uint64_t>(1, (kept[s] * table_total + kept_total / 2) / kept_total));
       given += table[s];
     }
   // What is left over or overdrawn goes where it costs least: a part more of a symbol saves about
@@ -40,8 +40,10 @@ Frequencies normalise(const std::array<uint64_t, symbol_count>& counts) {
     bool found = false;
     for (uint32_t s = 0; s < symbol_count; ++s) {
       if (kept[s] == 0 || (!more && table[s] < 2)) continue;
-      const uint64_t part = more ? table[s] : table[s] - 1u, best_part = more ? table[best] : table[best] - 1u;
-      const bool better = more ? kept[s] * best_part > kept[best] * part : kept[s] * best_part < kept[best] * part;
+      const uint64_t part = more ? table[s] : table[s] - 1u,
+                     best_part = more ? table[best] : table[best] - 1u;
+      const bool better =
+          more ? kept[s] * best_part > kept[best] * part : kept[s] * best_part < kept[best] * part;
       if (!found || better) {
         best = s;
         found = true;
@@ -92,7 +94,8 @@ void fill_decoding_table(const Frequencies& table, uint32_t escape_bits, Decodin
   const auto bins = make_bins(escape_bits);
   uint32_t slot = 0;
   for (uint32_t s = 0; s < symbol_count; ++s) {
-    out.word[s] = table[s] | uint64_t{slot} << 12 | uint64_t{bins[s].raw_bits} << 23 | uint64_t{bins[s].base} << 32;
+    out.word[s] =
+        bins[s].base | uint64_t{bins[s].raw_bits} << 32 | uint64_t{table[s]} << 40 | uint64_t{slot} << 52;
     for (uint32_t i = 0; i < table[s]; ++i) out.symbol_at[slot++] = static_cast<uint8_t>(s);
   }
 }

@@ -24,8 +24,8 @@ void write_frequencies(BitWriter& out, const Frequencies& table);
 /// False where what is there is no table.
 bool read_frequencies(BitReader& in, Frequencies& table);
 
-/// What a decoder needs to know of a symbol, in one word: part in bits 0..11, first slot in 12..22, number of
-/// raw bits in 23..28, base of the folded residual in 32..63.
+/// What a decoder needs to know of a symbol, in one word: base of the folded residual in bits 0..31, number
+/// of raw bits in 32..39, part in 40..51, first slot in 52..62.
 struct DecodingTable {
   std::array<uint8_t, table_total> symbol_at;  ///< for each value of the state's low bits
   std::array<uint64_t, symbol_count> word;

@@ -3,6 +3,7 @@
 #include <fmt/format.h>
 
 #include <cmath>
+#include <cstring>
 
 #include "formats/copy.h"
 #include "formats/parallel.h"
@@ -102,7 +103,7 @@ class Encoder {
         info_(source.info()),
         ctx_(ctx),
         survey_(info_.format),
-        container_(sink, Codec::svmm, container_version_for(info_)) {
+        container_(sink, Codec::svmm, container_version_for(info_), 0, *ctx.memory) {
     params_.page_side = options.page_side;
     params_.max_error = options.max_error;
     params_.levels = options.levels ? level_count(info_.dims, options.page_side) : 1;

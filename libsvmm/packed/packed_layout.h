@@ -3,6 +3,7 @@
 #pragma once
 
 #include <algorithm>
+#include <glm/common.hpp>
 #include <span>
 #include <string>
 #include <vector>
