@@ -47,7 +47,8 @@ Status encode(const Model& shared, std::span<const T> samples, Extent extent, st
     }
   }
   const std::span<const uint32_t> page(values.data(), samples.size());
-  const auto [least, greatest] = std::ranges::minmax(page);
+  const auto range = std::ranges::minmax(page);
+  const uint32_t least = range.min, greatest = range.max;
   if (greatest > model.max_value)
     return bad_usage("a sample above the greatest of the model: expected max_sample to be that of all pages");
   if (greatest - least <= 2 * uint64_t{model.max_error}) {
