@@ -31,14 +31,12 @@ float mean_of(const float* values, int count) {
   return counted == 0 ? std::numeric_limits<float>::quiet_NaN() : static_cast<float>(sum / counted);
 }
 template <class T>
-T commonest_of(std::array<T, 8> values, int count) {
-  std::sort(values.begin(), values.begin() + count);
+T commonest_of(const std::array<T, 8>& values, int count) {
   T best = values[0];
-  for (int i = 0, most = 0; i < count;) {
-    int end = i + 1;
-    while (end < count && values[static_cast<size_t>(end)] == values[static_cast<size_t>(i)]) ++end;
-    if (end - i > most) most = end - i, best = values[static_cast<size_t>(i)];
-    i = end;
+  for (int i = 0, most = 0; i < count; ++i) {
+    const T value = values[static_cast<size_t>(i)];
+    const auto times = static_cast<int>(std::count(values.begin(), values.begin() + count, value));
+    if (times > most || (times == most && value < best)) most = times, best = value;
   }
   return best;
 }
@@ -47,7 +45,7 @@ T commonest_of(std::array<T, 8> values, int count) {
 template <class T>
 void halve_row(const T* const* rows, int row_count, int64_t nx, Rule rule, int64_t fill, T* out) {
   for (int64_t x = 0; x < nx; x += 2) {
-    std::array<T, 8> values;
+    std::array<T, 8> values{};
     int count = 0;
     for (int r = 0; r < row_count; ++r)
       for (int64_t i = x; i < std::min(x + 2, nx); ++i) values[static_cast<size_t>(count++)] = rows[r][i];

@@ -4,6 +4,7 @@
 
 #include <cmath>
 #include <cstring>
+#include <numeric>
 
 #include "formats/copy.h"
 #include "formats/parallel.h"
@@ -19,6 +20,8 @@ namespace {
 
 /// Pages that a model is fitted to.
 constexpr uint64_t most_samples = 512;
+/// Of volumes of no more values it is tried whether they are smaller without loss.
+constexpr size_t most_exact_values = 64;
 
 /// Reads pages of a level as codes.
 class PageReader {
@@ -144,32 +147,63 @@ class Encoder {
       }
     }
     if (info_.format == VoxelFormat::float32) {
-      params_.map = ValueMap::for_floats(survey_.range(), params_.max_error);
-      if (params_.map.kind == CodeKind::ordered) params_.max_error = 0;
+      VOX_CHECK(choose_map());
     }
     return {};
   }
 
-  Result<page::Model> fit(int level) {
+  /// Steps within the bound, or, where these take more bytes, all bits.
+  Status choose_map() {
+    params_.map.kind = CodeKind::ordered;
+    const ValueMap steps = ValueMap::for_floats(survey_.range(), params_.max_error);
+    if (steps.kind == CodeKind::steps) {
+      VOX_TRY(const page::Model exact, fit(0));
+      VOX_TRY(const uint64_t exact_bytes, sampled_bytes(0, exact));
+      params_.map = steps;
+      VOX_TRY(const page::Model bounded, fit(0));
+      VOX_TRY(const uint64_t bounded_bytes, sampled_bytes(0, bounded));
+      if (exact_bytes < bounded_bytes) params_.map = {CodeKind::ordered, 0, 1};
+    }
+    if (params_.map.kind == CodeKind::ordered) params_.max_error = 0;
+    return {};
+  }
+
+  /// Pages of a level, spread over it and not on a grid of rows, whose content would be alike; all of them
+  /// where there are few.
+  template <class Take>
+  Status sample_pages(int level, const Take& take) {
     const PageGrid pages = grid(level);
     const uint64_t count = std::min(pages.pages(), most_samples);
-    page::ModelBuilder builder;
     PageReader reader(source(level), pages, params_);
-    VOX_TRY(const Reservation memory,
-            Reservation::take(count * page::max_voxels * sizeof(uint32_t), "pages to fit a model to", ctx_));
-    for (uint64_t i = 0; i < count; ++i) {
-      // Spread evenly: count times pages is below 2^63.
-      const uint64_t number = (2 * i + 1) * pages.pages() / (2 * count);
-      VOX_CHECK(reader.read(number, number + 1, [&](uint64_t, auto codes, page::Extent extent) -> Status {
-        builder.add(codes, extent);
-        return {};
-      }));
-    }
+    const uint64_t all = pages.pages();
+    uint64_t stride = all - all * 382 / 1000;  // near the golden section; all is below 2^50
+    while (std::gcd(stride, all) != 1) ++stride;
+    for (uint64_t i = 0, number = stride / 2 % all; i < count; ++i, number = (number + stride) % all)
+      VOX_CHECK(reader.read(number, number + 1, take));
+    return {};
+  }
+  /// Bytes of these pages, and of the model.
+  Result<uint64_t> sampled_bytes(int level, const page::Model& model) {
+    std::vector<std::byte> bytes = model.serialise();
+    VOX_CHECK(sample_pages(level, [&](uint64_t, auto codes, page::Extent extent) {
+      return page::encode_page(model, codes, extent, bytes);
+    }));
+    return bytes.size();
+  }
+
+  Result<page::Model> fit(int level) {
+    page::ModelBuilder builder;
+    VOX_TRY(const Reservation memory, Reservation::take(most_samples * page::max_voxels * sizeof(uint32_t),
+                                                        "pages to fit a model to", ctx_));
+    VOX_CHECK(sample_pages(level, [&](uint64_t, auto codes, page::Extent extent) -> Status {
+      builder.add(codes, extent);
+      return {};
+    }));
     page::ModelOptions options;
     if (info_.format == VoxelFormat::float32) {
-      options.max_sample = params_.map.kind == CodeKind::steps
-                               ? params_.map.code(static_cast<float>(survey_.range().hi))
-                               : 0xffffffff;
+      const bool steps = params_.map.kind == CodeKind::steps;
+      options.max_sample = steps ? params_.map.code(static_cast<float>(survey_.range().hi)) : 0xffffffff;
+      if (!steps && level == 0) options.values = survey_.values();
     } else {
       options.max_error = static_cast<uint32_t>(params_.max_error);
       const auto values = survey_.values();
@@ -177,6 +211,17 @@ class Encoder {
       // Means of voxels may be other values.
       const bool same_values = level == 0 || info_.is_labels || info_.format == VoxelFormat::bitmap;
       if (options.max_error == 0 && same_values) options.values = values;
+      // Of few values all may take fewer bytes than values near to them.
+      if (options.max_error > 0 && values.size() <= most_exact_values && level == 0) {
+        page::ModelOptions exact;
+        exact.max_sample = options.max_sample;
+        exact.values = values;
+        VOX_TRY(const page::Model bounded, builder.build(options));
+        VOX_TRY(const page::Model lossless, builder.build(exact));
+        VOX_TRY(const uint64_t bounded_bytes, sampled_bytes(level, bounded));
+        VOX_TRY(const uint64_t lossless_bytes, sampled_bytes(level, lossless));
+        return lossless_bytes < bounded_bytes ? lossless : bounded;
+      }
     }
     return builder.build(options);
   }

@@ -121,7 +121,8 @@ Result<std::shared_ptr<const PackedVolume>> PackedVolume::open(std::shared_ptr<c
     const ChunkEntry& entry = table[i];
     if (entry.kind != pages_kind && entry.kind != model_kind) continue;
     size_t* slot = nullptr;
-    if (entry.kind == model_kind && entry.part == 0 && entry.index < static_cast<uint32_t>(std::min(levels, 2)))
+    if (entry.kind == model_kind && entry.part == 0 &&
+        entry.index < static_cast<uint32_t>(std::min(levels, 2)))
       slot = &models[entry.index];
     if (entry.kind == pages_kind && entry.index < static_cast<uint32_t>(levels) &&
         entry.part < pages.levels[entry.index].chunks.size())

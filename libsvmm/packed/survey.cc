@@ -3,6 +3,8 @@
 #include <algorithm>
 #include <cmath>
 
+#include "libsvmm/packed/value_map.h"
+
 namespace voxkit::svmm {
 namespace {
 
@@ -13,6 +15,27 @@ void mark(ConstVoxelSpan voxels, Index3 size, std::vector<uint8_t>& seen) {
       const auto* const row = reinterpret_cast<const T*>(voxels.row(y, z));
       for (int64_t x = 0; x < size.x; ++x) seen[row[x]] = 1;
     }
+}
+
+constexpr size_t most_floats = 65536;
+
+/// Codes of the floats, up to more than `most_floats`.
+std::unordered_set<uint32_t> codes_of(ConstVoxelSpan voxels, Index3 size) {
+  std::unordered_set<uint32_t> codes;
+  uint32_t before = 0;
+  bool any = false;
+  for (int64_t z = 0; z < size.z; ++z)
+    for (int64_t y = 0; y < size.y; ++y) {
+      const auto* const row = reinterpret_cast<const float*>(voxels.row(y, z));
+      for (int64_t x = 0; x < size.x; ++x) {
+        const uint32_t code = ValueMap::ordered(row[x]);
+        if (any && code == before) continue;
+        codes.insert(before = code);
+        any = true;
+      }
+      if (codes.size() > most_floats) return codes;
+    }
+  return codes;
 }
 
 ValueRange range_of(ConstVoxelSpan voxels, Index3 size) {
@@ -44,6 +67,15 @@ void Survey::look(ConstVoxelSpan voxels, Index3 size) {
     for (size_t i = 0; i < seen.size(); ++i) seen_[i] |= seen[i];
     return;
   }
+  if (!many_floats_) {
+    const auto codes = codes_of(voxels, size);
+    const std::lock_guard lock(mutex_);
+    floats_.insert(codes.begin(), codes.end());
+    if (floats_.size() > most_floats) {
+      many_floats_ = true;
+      floats_.clear();
+    }
+  }
   const ValueRange found = range_of(voxels, size);
   if (found.lo > found.hi) return;
   const std::lock_guard lock(mutex_);
@@ -52,7 +84,8 @@ void Survey::look(ConstVoxelSpan voxels, Index3 size) {
 }
 
 std::vector<uint32_t> Survey::values() const {
-  std::vector<uint32_t> values;
+  std::vector<uint32_t> values(floats_.begin(), floats_.end());
+  std::sort(values.begin(), values.end());
   for (size_t i = 0; i < seen_.size(); ++i)
     if (seen_[i]) values.push_back(static_cast<uint32_t>(i));
   return values;

@@ -1,7 +1,9 @@
 // What is known of a volume's values before it is encoded.
 #pragma once
 
+#include <atomic>
 #include <mutex>
+#include <unordered_set>
 #include <vector>
 
 #include "formats/volume.h"
@@ -14,7 +16,8 @@ class Survey {
   explicit Survey(VoxelFormat format);
   /// Voxels of a box of that size. Thread-safe.
   void look(ConstVoxelSpan voxels, Index3 size);
-  /// Of integers: all values there are, ascending.
+  /// The codes of all values there are, ascending: of integers themselves, of floats their bits in order
+  /// (ValueMap::ordered). Of floats none where there are more than 65536.
   std::vector<uint32_t> values() const;
   /// Of floats: the least and greatest finite value; 0 to 0 where there is none.
   ValueRange range() const { return range_.lo <= range_.hi ? range_ : ValueRange{}; }
@@ -22,7 +25,9 @@ class Survey {
  private:
   VoxelFormat format_;
   std::mutex mutex_;
-  std::vector<uint8_t> seen_;  ///< by value of integers
+  std::vector<uint8_t> seen_;             ///< by value of integers
+  std::unordered_set<uint32_t> floats_;   ///< codes of floats
+  std::atomic<bool> many_floats_{false};  ///< more than are counted
   ValueRange range_{1, 0};
 };
 
