@@ -20,8 +20,6 @@ namespace {
 
 /// Pages that a model is fitted to.
 constexpr uint64_t most_samples = 512;
-/// Of volumes of no more values it is tried whether they are smaller without loss.
-constexpr size_t most_exact_values = 64;
 
 /// Reads pages of a level as codes.
 class PageReader {
@@ -211,8 +209,9 @@ class Encoder {
       // Means of voxels may be other values.
       const bool same_values = level == 0 || info_.is_labels || info_.format == VoxelFormat::bitmap;
       if (options.max_error == 0 && same_values) options.values = values;
-      // Of few values all may take fewer bytes than values near to them.
-      if (options.max_error > 0 && values.size() <= most_exact_values && level == 0) {
+      // Values that are few beside the steps of the bound may take fewer bytes than these.
+      const uint64_t steps = options.max_sample / (2 * uint64_t{options.max_error} + 1) + 1;
+      if (options.max_error > 0 && values.size() <= 2 * steps && level == 0) {
         page::ModelOptions exact;
         exact.max_sample = options.max_sample;
         exact.values = values;

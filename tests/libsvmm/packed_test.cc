@@ -166,7 +166,7 @@ TEST(Packed, NoVoxelIsFurtherThanTheBound) {
         double worst = 0;
         for (size_t i = 0; i < before.size(); ++i) worst = std::max(worst, std::abs(before[i] - after[i]));
         EXPECT_LE(worst, bound) << name(format);
-        EXPECT_LE(file.bytes.size(), encode(source, {}).bytes.size());
+        EXPECT_LE(file.bytes.size(), encode(source, {}).bytes.size()) << name(format) << " " << bound;
       }
 }
 
