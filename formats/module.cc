@@ -2,7 +2,10 @@
 
 #include <dlfcn.h>
 #include <fmt/format.h>
+#include <sys/mman.h>
 #include <unistd.h>
+
+#include <thread>
 
 namespace voxkit {
 namespace {
@@ -14,6 +17,18 @@ std::string loader_error() {
   for (char& c : line)
     if (c == '\n') c = ' ';
   return line;
+}
+
+/// Whether there is room for what loading a module maps. The libraries behind OpenImageIO and OpenVDB start
+/// a thread for each core as they are loaded (log4cplus), and wait for ever where one of these cannot be had.
+bool room_for(const std::string& module) {
+  if (module != "image_stack" && module != "openvdb") return true;
+  constexpr size_t libraries = size_t{500} << 20, thread = size_t{16} << 20;
+  const size_t bytes = libraries + thread * std::thread::hardware_concurrency();
+  void* const probe = mmap(nullptr, bytes, PROT_NONE, MAP_PRIVATE | MAP_ANONYMOUS | MAP_NORESERVE, -1, 0);
+  if (probe == MAP_FAILED) return false;
+  munmap(probe, bytes);
+  return true;
 }
 
 }  // namespace
@@ -32,6 +47,12 @@ Result<const ModuleTable*> load_module(const std::string& folder, const ModuleNe
     return fail(need.missing, {},
                 fmt::format("{} needs the {} module: install {} and rebuild", need.action, need.module,
                             need.package));
+  if (void* const loaded = dlopen(path.c_str(), RTLD_NOW | RTLD_NOLOAD); loaded)
+    dlclose(loaded);
+  else if (!room_for(need.module))
+    return fail(
+        ErrorCode::limit, {},
+        fmt::format("the {} module needs more address space than this process may have", need.module));
   // dlopen counts how often a module is opened; it is never closed, since sources and sinks live in it.
   void* handle = dlopen(path.c_str(), RTLD_NOW | RTLD_LOCAL);
   if (!handle) {

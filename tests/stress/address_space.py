@@ -58,7 +58,7 @@ def main():
             refused = 0
             for limit in range(40, options.most, options.step):
                 done = subprocess.run([options.bin / command[0], *command[1:], "-f", "-j", "2"], cwd=folder,
-                                      capture_output=True, text=True,
+                                      capture_output=True, text=True, timeout=60,
                                       preexec_fn=lambda: resource.setrlimit(resource.RLIMIT_AS,
                                                                             (limit << 20, limit << 20)))
                 if done.returncode == 0:
