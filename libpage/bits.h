@@ -57,7 +57,9 @@ class BitReader {
       overrun_ = true;
       return 0;
     }
-    return static_cast<uint32_t>((uint64_t{1} << (k + more)) + get(k + more) - (uint64_t{1} << k));
+    const uint64_t value = (uint64_t{1} << (k + more)) + get(k + more) - (uint64_t{1} << k);
+    if (value > UINT32_MAX) overrun_ = true;
+    return static_cast<uint32_t>(value);
   }
   int32_t signed_golomb(int k) {
     const uint32_t folded = golomb(k);

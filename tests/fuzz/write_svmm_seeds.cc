@@ -1,9 +1,10 @@
-// Writes the seeds of container_fuzz, svmm_fuzz and svmm_encode_fuzz: FOLDER/TARGET/NUMBER.
+// Writes the seeds of container_fuzz, svmm_fuzz, svmm_encode_fuzz and svmm_packed_fuzz: FOLDER/TARGET/NUMBER.
 #include <cstdio>
 #include <filesystem>
 #include <fstream>
 #include <string>
 
+#include "libsvmm/packed/packed.h"
 #include "libsvmm/svmm.h"
 #include "tests/memory_volume.h"
 
@@ -17,14 +18,46 @@ void put(const std::filesystem::path& folder, int number, const std::string& byt
   std::ofstream(folder / std::to_string(number), std::ios::binary) << bytes;
 }
 
-std::string small_file(VoxelFormat format, Layout layout, Base base, int number) {
+VolumeInfo info_of(Index3 dims, VoxelFormat format) {
   VolumeInfo info;
-  info.dims = {7 + number % 5, 5, 6};
+  info.dims = dims;
   info.format = format;
   info.sample_type = format == VoxelFormat::density16 ? SampleType::u16
                      : format == VoxelFormat::float32 ? SampleType::f32
                      : format == VoxelFormat::bitmap  ? SampleType::bit
                                                       : SampleType::u8;
+  return info;
+}
+
+/// Layout packed; `number` says what is in it, and how it is cut.
+std::string packed_file(VoxelFormat format, double max_error, int number) {
+  const VolumeInfo info = info_of(number % 2 == 0 ? Index3(19, 9, 17) : Index3(7, 20, 1), format);
+  std::vector<std::byte> voxels;
+  for (int64_t i = 0; i < info.box().voxels(); ++i) {
+    const auto value = static_cast<uint16_t>(number % 3 == 0 ? i / 7 % 5 * 11 : i * i / 31 % 200 + i % 3);
+    const Voxel voxel = format == VoxelFormat::float32     ? Voxel::of(static_cast<float>(value) / 8 - 3)
+                        : format == VoxelFormat::density16 ? Voxel::of(static_cast<uint16_t>(value * 9))
+                        : format == VoxelFormat::bitmap    ? Voxel::of(static_cast<uint8_t>(value & 1))
+                                                           : Voxel::of(static_cast<uint8_t>(value));
+    voxels.insert(voxels.end(), voxel.bytes.begin(), voxel.bytes.begin() + voxel_bytes(format));
+  }
+  test::MemorySource source(info, voxels);
+  MemoryBudget memory;
+  Context ctx;
+  ctx.memory = &memory;
+  std::string file;
+  const auto written = encode_packed(
+      source, {.max_error = max_error, .levels = number % 5 != 0, .page_side = number % 4 < 2 ? 8 : 16},
+      [&](std::span<const std::byte> bytes) {
+        file.append(reinterpret_cast<const char*>(bytes.data()), bytes.size());
+        return Status{};
+      },
+      ctx);
+  return written ? file : std::string();
+}
+
+std::string small_file(VoxelFormat format, Layout layout, Base base, int number) {
+  const VolumeInfo info = info_of({7 + number % 5, 5, 6}, format);
   Params params;
   params.layout = layout;
   params.base = base;
@@ -85,4 +118,13 @@ int main(int count, char** arguments) {
         if (!file.empty() && number % 8 == 0) put(folder / "container", number, file);
         ++number;
       }
+  number = 0;
+  for (const VoxelFormat format :
+       {VoxelFormat::density8, VoxelFormat::density16, VoxelFormat::float32, VoxelFormat::bitmap})
+    for (int i = 0; i < 6; ++i) {
+      const double max_error = format == VoxelFormat::bitmap || i < 3 ? 0 : i;
+      const std::string file = packed_file(format, max_error, number);
+      if (file.empty()) return 1;
+      put(folder / "svmm_packed", number++, file);
+    }
 }

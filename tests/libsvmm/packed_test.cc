@@ -9,8 +9,8 @@
 
 #include "formats/volume/open_volume.h"
 #include "libsvmm/packed/packed_layout.h"
-#include "tests/attack.h"
 #include "tests/damage.h"
+#include "tests/libsvmm/packed_attack.h"
 #include "tests/libsvmm/volumes.h"
 
 namespace voxkit::svmm {
@@ -242,30 +242,6 @@ TEST(Packed, WhatIsNotHeldIsRefused) {
   refused(VoxelFormat::density8, {.max_error = 1}, "labels", true);
 }
 
-/// Whatever the bytes: an error, or as many voxels as were asked for.
-std::string attack(std::span<const std::byte> file) {
-  const auto open_packed = [](const std::shared_ptr<const Container>& container) {
-    return PackedVolume::open(container, memory());
-  };
-  return voxkit::test::attack_with<voxkit::test::Answer>(
-             file, open_packed,
-             [](const PackedVolume& volume, voxkit::test::Answer& answer, Context&) {
-               for (int level = 0; level < volume.params().levels && answer.fault.empty(); ++level)
-                 for (const Box& box :
-                      voxkit::test::boxes_of(volume.levels()[static_cast<size_t>(level)].dims)) {
-                   std::optional<std::vector<std::byte>> decoded;
-                   answer.fault = voxkit::test::ask_box(
-                       volume.info().format, box, decoded,
-                       [&](const Box& part, VoxelSpan out) { return volume.decode(part, level, out); },
-                       [&](Index3 voxel) { return volume.sample(voxel, level); },
-                       [&](const Box& part) { return volume.uniform(part, level); });
-                   if (answer.fault.empty() && answer.checked && !decoded)
-                     answer.fault = "checked, and damaged";
-                 }
-             })
-      .fault;
-}
-
 TEST(Packed, DamagedFilesAreRefusedOrRead) {
   std::mt19937 random(4);
   const int tries = std::getenv("VOXKIT_MUTATIONS") ? std::atoi(std::getenv("VOXKIT_MUTATIONS")) : 400;
@@ -275,14 +251,14 @@ TEST(Packed, DamagedFilesAreRefusedOrRead) {
       const VolumeInfo info = make_info({19, 18, 17}, format);
       voxkit::test::MemorySource source(info, bytes_of(make_voxels(info, Content::blobs, 3), format));
       const Bytes file = encode(source, {.max_error = bound}).bytes;
-      ASSERT_EQ(attack(file), "");
+      ASSERT_EQ(attack_packed(file).fault, "");
       for (size_t length = 0; length < file.size(); length += 7)
-        ASSERT_EQ(attack(std::span(file).first(length)), "") << length;
+        ASSERT_EQ(attack_packed(std::span(file).first(length)).fault, "") << length;
       for (int i = 0; i < tries; ++i) {
         Bytes bad = file;
         voxkit::test::damage(bad, 0, bad.size(), false, random);
         voxkit::test::repair(bad);
-        ASSERT_EQ(attack(bad), "") << name(format) << " damage " << i;
+        ASSERT_EQ(attack_packed(bad).fault, "") << name(format) << " damage " << i;
       }
     }
 }

@@ -1,0 +1,226 @@
+"""Pages and their models, from section 5 of formats/FORMAT.md alone. For packed_decode.py beside this file."""
+
+from functools import lru_cache
+
+from container import require
+
+TAPS = ([(t % 3 - 1, t // 3 - 1, -1) for t in range(9)] + [(t - 10, -1, 0) for t in range(9, 12)] +
+        [(-1, 0, 0), (-2, 0, 0), (0, -2, 0), (0, 0, -2)])
+THRESHOLDS = (1, 2, 3, 4, 5, 6, 7, 8, 11, 15, 20, 27, 37, 49, 67, 90, 122, 164, 222, 299, 404, 546, 737)
+MOST = THRESHOLDS[-1]
+CONTEXTS = [sum(t <= a for t in THRESHOLDS) for a in range(MOST + 2 * 255 + 1)]  # of an activity, without 24 and 48
+ESCAPE = 72
+
+
+# ---- Section 5.1: the model ------------------------------------------------------------------------------------------
+
+
+class Bits:
+    def __init__(self, data):
+        self.data, self.at = data, 0
+
+    def get(self, count):
+        end = self.at + count
+        require(end <= 8 * len(self.data), "page model: cut off")
+        value = int.from_bytes(self.data[self.at // 8:(end + 7) // 8], "little") >> self.at % 8
+        self.at = end
+        return value & (1 << count) - 1
+
+    def golomb(self, k):
+        zeros = 0
+        while not self.get(1):
+            zeros += 1
+        require(k + zeros <= 32, "page model: a number of {} bits", k + zeros)
+        value = (1 << k + zeros) - (1 << k) + self.get(k + zeros)
+        require(value < 1 << 32, "page model: number {}", value)
+        return value
+
+    def signed_golomb(self, k):
+        g = self.golomb(k)
+        return -(g + 1) // 2 if g % 2 else g // 2
+
+
+def lacks(c, tap):
+    """Whether a class of voxels lacks a tap."""
+    dx, dy, dz = TAPS[tap]
+    px, py = c % 3, c // 3 % 3
+    return ((dx < 0 and px == 0) or (dx > 0 and px == 2) or (dy < 0 and py == 0) or (dy > 0 and py == 2) or
+            (dz < 0 and c < 9))
+
+
+def rest_tap(c):
+    return next((t for t in (4, 10, 12) if not lacks(c, t)), None)
+
+
+class Model:
+    def __init__(self, data):
+        bits = Bits(data)
+        require(bits.get(8) == 1, "page model: unknown version")
+        self.has_palette = bits.get(1)
+        self.most, self.bound, self.background = bits.get(32), bits.golomb(0), bits.golomb(8)
+        require(self.bound < 1 << 31, "page model: bound {}", self.bound)
+        require(self.background <= self.most, "page model: background {} above {}", self.background, self.most)
+        self.palette = None
+        if self.has_palette:
+            require(self.most < 1 << 16 and self.bound == 0, "page model: a palette of {}, bound {}", self.most + 1,
+                    self.bound)
+            self.palette, entry = [], -1
+            for _ in range(self.most + 1):
+                entry += 1 + bits.golomb(2)
+                require(entry < 1 << 32, "page model: entry {} of the palette", entry)
+                self.palette.append(entry)
+        self.greatest_sample = self.palette[-1] if self.has_palette else self.most
+        self.wide = self.most >= 1 << 16
+        self.value_bytes = 1 if self.most < 1 << 8 else 2 if self.most < 1 << 16 else 4
+        self.weights = [self.read_weights(bits, c) for c in range(18)]
+        self.tables = []
+        for context in range(72):
+            same = bits.get(1)
+            require(not same or context > 0, "page model: the first table is as the one before")
+            self.tables.append(self.tables[-1] if same else self.read_table(bits))
+        used = (bits.at + 7) // 8
+        require(bits.get(8 * used - bits.at) == 0 and used == len(data), "page model: bits behind its end")
+        self.palette = self.palette or range(self.most + 1)
+
+    @staticmethod
+    def read_weights(bits, c):
+        """Pairs of taps and weights."""
+        rest = rest_tap(c)
+        weights = {t: bits.signed_golomb(7) for t in range(16) if not lacks(c, t) and t != rest}
+        if rest is not None:
+            weights[rest] = 4096 - sum(weights.values())
+        require(all(-32767 <= w <= 32767 for w in weights.values()) and sum(map(abs, weights.values())) <= 65535,
+                "page model: weights of class {}", c)
+        return [(t, w) for t, w in weights.items() if w]
+
+    @staticmethod
+    def read_table(bits):
+        """The symbol of each of 2048 slots, with its first slot and its part."""
+        count = bits.get(7)
+        require(count <= 72, "page model: a table of {} symbols", count)
+        parts, before = [], 512
+        for _ in range(count):
+            before = bits.golomb(max(0, before.bit_length() - 2))
+            parts.append(before)
+        require(sum(parts) < 2048 and (not parts or parts[-1]), "page model: a table that adds up to {}", sum(parts))
+        parts += [0] * (72 - count) + [2048 - sum(parts)]
+        slots = []
+        for symbol, part in enumerate(parts):
+            slots += [(symbol, len(slots), part)] * part
+        return slots
+
+
+# ---- Section 5.2: a page ---------------------------------------------------------------------------------------------
+
+
+class State:
+    def __init__(self, page):
+        size = len(page)
+        cut = size if size <= 8 else 5 + (size - 5) % 4
+        self.value, self.words = int.from_bytes(page[:cut], "little"), page[cut:]
+
+    def renew(self):
+        if self.value < 1 << 32 and self.words:
+            self.value = self.value << 32 | int.from_bytes(self.words[-4:], "little")
+            self.words = self.words[:-4]
+
+    def take(self, count):
+        taken = self.value & (1 << count) - 1
+        self.value >>= count
+        return taken
+
+    def symbol(self, slots):
+        symbol, first, part = slots[self.value % 2048]
+        self.value = self.value // 2048 * part + self.value % 2048 - first
+        return symbol
+
+    def folded(self, slots, wide):
+        s = self.symbol(slots)
+        base, count = s, 0
+        if s == ESCAPE:
+            base, count = 0, 32 if wide else 17
+        elif s >= 16:
+            count = 3 + (s - 16) // 2
+            base = 2 + s % 2 << count
+        if not wide:
+            base += self.take(count)
+        else:
+            low = min(count, 16)
+            self.renew()
+            base += self.take(low)
+            self.renew()
+            base += self.take(count - low) << low
+        self.renew()
+        return base
+
+
+@lru_cache(maxsize=64)
+def places(shape):
+    """Of each voxel of a page of this shape, in order: its class, where its taps are, which of these its range is
+    of, where its activity comes from (eight times), the voxel before (None if it has none), and 0, 24 or 48."""
+    X, Y, Z = shape
+
+    def at(x, y, z):
+        x, y, z = (min(max(i, 0), n - 1) for i, n in zip((x, y, z), shape))
+        return (z * Y + y) * X + x
+
+    def place(i, n):
+        return 0 if i == 0 else 2 if i == n - 1 else 1
+
+    out = []
+    for z in range(Z):
+        for y in range(Y):
+            u = (y - 1, z) if y > 0 else (y, z - 1)
+            b = (y, z - 1) if z > 0 else (y - 1, z)
+            for x in range(X):
+                taps = [at(x + dx, y + dy, z + dz) for dx, dy, dz in TAPS]
+                span, near = (), ()
+                if y > 0 or z > 0:
+                    span = taps[0 if z > 0 else 9:12 if y > 0 else 9]
+                    near = tuple(at(x + dx, *row) for row in (u, b) for dx in (-1, 0, 0, 1))
+                out.append((place(x, X) + 3 * place(y, Y) + (9 if z > 0 else 0), taps, span, near,
+                            at(x - 1, y, z) if x > 0 else None, 0 if z == 0 else 24 if y == 0 else 48))
+    return out
+
+
+def decode_page(model, page, shape):
+    """The samples of a page of `shape` voxels, x fastest."""
+    count = shape[0] * shape[1] * shape[2]
+    if len(page) <= model.value_bytes:
+        require(len(page) in (0, model.value_bytes), "page: {} bytes, expected {}", len(page), model.value_bytes)
+        value = int.from_bytes(page, "little") if page else model.background
+        require(value <= model.most, "page: value {} above {}", value, model.most)
+        return [model.palette[value]] * count
+
+    state, values, magnitudes = State(page), [], []
+    step = 2 * model.bound + 1
+    for c, taps, span, near, left, rows in places(shape):
+        # 1. Prediction.
+        if values:
+            total = sum(weight * values[taps[t]] for t, weight in model.weights[c])
+        else:
+            total = 4096 * model.background
+        predicted = min(max((total + 2047) // 4096, 0), model.most)
+        mirrored = (total + 2047) % 4096 >= 2048
+        # 2. Context.
+        if near:
+            around = [values[at] for at in span]
+            activity = sum(magnitudes[at] for at in near) + ((max(around) - min(around)) * (32768 // step) >> 16)
+            activity = min(activity, MOST)
+            if left is None:
+                activity = min(activity + 2 * magnitudes[near[1]], MOST)
+        else:
+            activity = 0 if values else MOST
+        if left is not None:
+            activity += 2 * magnitudes[left]
+        # 3. Symbol.
+        folded = state.folded(model.tables[CONTEXTS[activity] + rows], model.wide)
+        # 4. Value.
+        size = (folded + 1) // 2
+        value = predicted + (-size if folded % 2 != mirrored else size) * step
+        if model.wide and model.bound == 0:
+            value %= 1 << 32
+        values.append(min(max(value, 0), model.most))
+        magnitudes.append(min(size, 255))
+    require(state.value == 1 and not state.words, "page: it does not end where its voxels end")
+    return [model.palette[value] for value in values]

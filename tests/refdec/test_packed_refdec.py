@@ -1,0 +1,446 @@
+#!/usr/bin/env python3
+"""Holds the reference decoder of layout packed against the tools: VOXKIT_BIN=build/bin python3 test_packed_refdec.py
+
+Without VOXKIT_BIN only the tests that need no tool are run.
+"""
+
+import itertools
+import json
+import math
+import os
+import random
+import struct
+import subprocess
+import sys
+import unittest
+
+sys.dont_write_bytecode = True
+from container import Container, Refused  # noqa: E402
+from helpers import BIN, HERE, ToolCase, container, raw_file, read, write  # noqa: E402
+from packed_decode import Packed, decode  # noqa: E402
+from page_decode import Model, decode_page, lacks, rest_tap  # noqa: E402
+
+DECODER = os.path.join(HERE, "packed_decode.py")
+
+
+# ---- Without tools ---------------------------------------------------------------------------------------------------
+
+
+class BitWriter:
+    def __init__(self):
+        self.bits = []
+
+    def put(self, value, count):
+        self.bits += [value >> i & 1 for i in range(count)]
+        return self
+
+    def golomb(self, value, k):
+        zeros = (value + (1 << k)).bit_length() - 1 - k
+        return self.put(1 << zeros, zeros + 1).put(value + (1 << k) - (1 << k + zeros), k + zeros)
+
+    def signed_golomb(self, value, k):
+        return self.golomb(2 * value if value >= 0 else -2 * value - 1, k)
+
+    def bytes(self):
+        return bytes(sum(bit << i for i, bit in enumerate(self.bits[at:at + 8])) for at in range(0, len(self.bits), 8))
+
+
+class Fields:
+    """A model whose weights are all on the rest taps, unless `weights` has others by (class, tap), and whose tables are
+    all the same."""
+
+    def __init__(self, **changes):
+        self.version, self.most, self.bound, self.background, self.palette = 1, 9, 1, 5, None
+        self.weights, self.parts, self.first_same, self.more = {}, (1000, 500, 500), 0, 0
+        for name, value in changes.items():
+            setattr(self, name, value)
+
+    def bytes(self):
+        out = BitWriter().put(self.version, 8).put(self.palette is not None, 1).put(self.most, 32)
+        out.golomb(self.bound, 0).golomb(self.background, 8)
+        before = -1
+        for entry in self.palette or ():
+            out.golomb(entry - before - 1, 2)
+            before = entry
+        for c in range(18):
+            for t in range(16):
+                if not lacks(c, t) and t != rest_tap(c):
+                    out.signed_golomb(self.weights.get((c, t), 0), 7)
+        out.put(self.first_same, 1)
+        if not self.first_same:
+            out.put(len(self.parts), 7)
+            before = 512
+            for part in self.parts:
+                out.golomb(part, max(0, before.bit_length() - 2))
+                before = part
+        out.put((1 << 71) - 1, 71)
+        if self.more:
+            out.put(self.more, 8)
+        return out.bytes()
+
+    def page(self, folded):
+        """A page of these folded residuals, as section 5.2 has it backwards; narrow models, symbols below 16."""
+        parts = list(self.parts) + [0] * (72 - len(self.parts)) + [2048 - sum(self.parts)]
+        state, words = 1, b""
+        for f in reversed(folded):
+            s, bits = (f, 0) if f < 16 and parts[f] else (72, 17)
+            if state << bits << 11 >= parts[s] << 64:
+                words += struct.pack("<I", state & 0xffffffff)
+                state >>= 32
+            state = state << bits | (f if bits else 0)
+            state = (state // parts[s] << 11) + state % parts[s] + sum(parts[:s])
+        least = 1 if self.most < 256 else 2
+        return state.to_bytes(max((state.bit_length() + 7) // 8, 0 if words else least + 1), "little") + words
+
+
+class Models(unittest.TestCase):
+    def refused(self, rule, **changes):
+        with self.subTest(**changes), self.assertRaisesRegex(Refused, rule):
+            Model(Fields(**changes).bytes())
+
+    def test_rules(self):
+        Model(Fields().bytes())
+        self.refused("version", version=2)
+        self.refused("background", background=10)
+        self.refused("bound", bound=1 << 31)
+        self.refused("palette", palette=range(10))  # and a bound
+        self.refused("entry", palette=[2**32 - 9 + i for i in range(10)], bound=0)
+        self.refused("palette", palette=[0], most=65536, bound=0)
+        self.refused("first table", first_same=1)
+        self.refused("table of 73", parts=[1] * 73)
+        self.refused("adds up", parts=(1000, 500, 548))
+        self.refused("adds up", parts=(1000, 500, 0))
+        self.refused("behind its end", more=128)
+        self.refused("behind its end", more=1 << 7 | 1)
+        self.refused("class 17", weights={(17, 0): 32768})
+        self.refused("class 4", weights={(4, 9): 32767, (4, 11): 3000})
+        self.refused("class 4", weights={(4, 9): -28672})  # the rest tap's is one too many
+        Model(Fields(weights={(4, 9): -28671}).bytes())
+        Model(Fields(most=2**32 - 1, bound=2**31 - 1, background=2**32 - 1).bytes())
+        with self.assertRaisesRegex(Refused, "33 bits"):
+            Model(BitWriter().put(1, 8).put(0, 1).put(9, 32).put(1 << 33, 34).put(0, 64).bytes())
+
+    def test_every_cut(self):
+        data = Fields(weights={(9, 14): 5, (2, 12): -7}).bytes()
+        for length in range(len(data)):
+            with self.assertRaises(Refused):
+                Model(data[:length])
+
+    def test_one_value(self):
+        for most, size in ((255, 1), (256, 2), (65535, 2), (65536, 4)):
+            model = Model(Fields(most=most).bytes())
+            self.assertEqual(decode_page(model, b"", (2, 1, 1)), [5, 5])
+            self.assertEqual(decode_page(model, most.to_bytes(size, "little"), (1, 2, 1)), [most] * 2)
+            for page in [bytes(i) for i in range(1, size)] + ([(most + 1).to_bytes(size, "little")] if most == 256 else []):
+                with self.assertRaises(Refused):
+                    decode_page(model, page, (1, 1, 1))
+
+    def test_rounding_and_mirrors(self):
+        """One row of three: 5, 8, and one predicted as 8 (1 - w) + 5 w, with w = weight / 4096."""
+        for weight, predicted, mirrored in ((0, 8, False),  # 8, as it is
+                                            (2048, 6, True),  # 6.5, halves down
+                                            (-2048, 9, True),  # 9.5
+                                            (2047, 7, False),  # a little more than 6.5
+                                            (2049, 6, True), (1, 8, False), (-1, 8, True)):
+            fields = Fields(most=100, bound=0, weights={(2, 13): weight})
+            for folded, distance in ((0, 0), (1, 1 if mirrored else -1), (2, -1 if mirrored else 1)):
+                with self.subTest(weight=weight, folded=folded):
+                    self.assertEqual(decode_page(Model(fields.bytes()), fields.page([0, 6, folded]), (3, 1, 1)),
+                                     [5, 8, predicted + distance])
+
+
+class SmallFile(unittest.TestCase):
+    """A DENSITY8 volume of 17 x 2 x 1 voxels: two pages, one of them the background, and a level of 9 x 1 x 1."""
+
+    def setUp(self):
+        self.voli = bytearray(struct.pack("<3QBB6x3d3d2d2d", 17, 2, 1, 3, 1, 1, 1, 1, 0, 0, 0, 1, 0, 0, 0))
+        self.pakp = bytearray(struct.pack("<3B5x3d32x", 4, 2, 1, 0, 0, 1))
+        self.fine, self.coarse = Fields(), Fields(bound=0, palette=(3, 7, 200), most=2, background=1)
+        # In steps of 3, within 0 and 9. The second row is predicted from the first.
+        self.folded = [2, 1, 1, 1, 1, 0, 2, 40, 0, 0, 3, 2, 2, 2, 0, 0] + [0, 0, 4, 2] + [0] * 12
+        page = self.fine.page(self.folded)
+        self.pages = bytearray((6, len(page), 0)) + page
+        self.coarse_page = bytearray((1, 1, 2))
+
+    def chunks(self):
+        return [(b"VOLI", 0, 0, bytes(self.voli)), (b"PAKP", 0, 0, bytes(self.pakp)),
+                (b"MODL", 1, 0, self.coarse.bytes()), (b"PAGE", 1, 0, bytes(self.coarse_page)),
+                (b"MODL", 0, 0, self.fine.bytes()), (b"PAGE", 0, 0, bytes(self.pages))]
+
+    def decode(self, data, level=0):
+        return bytes(decode(Packed(Container(data)), level))
+
+    def refused(self, data, rule):
+        with self.assertRaisesRegex(Refused, rule):
+            self.decode(data)
+            self.decode(data, 1)
+
+    def test_levels(self):
+        data = container(self.chunks())
+        row = [8, 5, 2, 0, 0, 0, 3, 9, 9, 9, 3, 6, 9, 9, 9, 9]
+        self.assertEqual(list(self.decode(data)), row + [5] + row[:2] + [8, 3] + row[4:] + [5])
+        self.assertEqual(self.decode(data, 1), bytes([200] * 9))
+        self.coarse_page = bytearray((0,))
+        self.assertEqual(self.decode(container(self.chunks()), 1), bytes([7] * 9))
+
+    def test_any_order_and_unknown_kinds(self):
+        chunks = [(b"NEWS", 7, 9, b"x" * 65)] + self.chunks()[::-1] + [(b"SVMP", 0, 0, b"")]
+        self.assertEqual(self.decode(container(chunks)), self.decode(container(self.chunks())))
+
+    def test_every_cut_and_every_flip(self):
+        data = container(self.chunks())
+        for length in range(len(data)):
+            self.refused(data[:length], ".")
+        end = len(data)
+        used = bytearray(b"\1" * 64 + bytes(end - 64 - 64 * 7) + b"\1" * 64 * 7)
+        for chunk in Container(data).chunks.values():
+            used[chunk.offset:chunk.offset + chunk.length] = b"\1" * chunk.length
+        for bit in range(8 * len(data)):
+            flipped = bytearray(data)
+            flipped[bit // 8] ^= 1 << bit % 8
+            if used[bit // 8]:
+                self.refused(bytes(flipped), ".")
+            else:  # a gap
+                self.assertEqual(self.decode(bytes(flipped)), self.decode(data))
+        self.refused(data + bytes(64), "truncated")
+
+    def test_chunk_rules(self):
+        chunks = self.chunks()
+        self.refused(container(chunks, codec=3), "codec 3")
+        for gone in range(6):
+            self.refused(container(chunks[:gone] + chunks[gone + 1:]), "expected exactly one|missing")
+            self.refused(container(chunks + [chunks[gone]]), "twice")
+        for more in ((b"PAKP", 1, 0), (b"PAGE", 0, 1), (b"PAGE", 2, 0), (b"MODL", 2, 0), (b"MODL", 0, 1)):
+            self.refused(container(chunks + [(*more, b"\0")]), "expected exactly one|belong to no level")
+        self.refused(container(chunks[:5] + [(b"PAGE", 0, 0, b"")]), "too many bits")
+        for change in (b"\0", b"\1"):
+            self.refused(container(chunks[:5] + [(b"PAGE", 0, 0, bytes(self.pages) + change)]), "add up")
+        self.refused(container(chunks[:5] + [(b"PAGE", 0, 0, bytes(self.pages)[:-1])]), "add up")
+        # A page with a byte more, in the length as well; it would be a word.
+        page = self.fine.page(self.folded)
+        for changed in (page[:1], page[:-1], page + b"\0", page[:5] + page, bytes((page[0] ^ 1,)) + page[1:]):
+            self.refused(container(chunks[:5] + [(b"PAGE", 0, 0, bytes((6, len(changed), 0)) + changed)]),
+                         "does not end|value")
+        self.coarse_page = bytearray((1, 1, 3))
+        self.refused(container(self.chunks()), "value 3 above 2")
+
+    def test_field_rules(self):
+        for chunk, layout, offset, value, rule in (
+                ("voli", "<B", 24, 1, "with RGBA32"), ("pakp", "<B", 0, 2, "pages of 2"), ("pakp", "<B", 0, 5, "pages of 2"),
+                ("pakp", "<B", 0, 3, "levels, expected 1 or 3"), ("pakp", "<B", 1, 0, "levels"), ("pakp", "<B", 1, 3, "levels"),
+                ("pakp", "<B", 1, 1, "belong to no level"), ("pakp", "<B", 2, 0, "codes"), ("pakp", "<B", 2, 2, "codes"),
+                ("pages", "<B", 0, 25, "too many bits"), ("pages", "<B", 0, 24, "add up"), ("pages", "<B", 1, 1, "add up")):
+            self.setUp()
+            struct.pack_into(layout, getattr(self, chunk), offset, value)
+            with self.subTest(chunk=chunk, offset=offset, value=value):
+                self.refused(container(self.chunks()), rule)
+        self.setUp()
+        self.fine.most = 256
+        self.refused(container(self.chunks()), "samples up to 256")
+        self.setUp()
+        self.coarse.palette = (3, 7, 256)
+        self.refused(container(self.chunks()), "samples up to 256")
+
+    def floats(self, codes, lo, step, values):
+        voli = struct.pack("<3QBB6x3d3d2d2d", 1, 1, 1, 5, 9, 1, 1, 1, 0, 0, 0, 1, 0, 0, 0)
+        out = []
+        for value in values:
+            model = Fields(most=2**32 - 1, bound=0, background=value)
+            out.append(self.decode(container([
+                (b"VOLI", 0, 0, voli), (b"PAKP", 0, 0, struct.pack("<3B5x3d32x", 3, 1, codes, lo, step, 0)),
+                (b"MODL", 0, 0, model.bytes()), (b"PAGE", 0, 0, b"\0")])))
+        return out
+
+    def test_floats(self):
+        bits = [0x80000000, 0xbf800000, 0x40800000, 2**32 - 1, 0]
+        self.assertEqual(self.floats(2, 0, 0, bits), [struct.pack("<I", b) for b in (
+            0, 0x3f800000, 0xbf7fffff, 0x7fffffff, 0xffffffff)])
+        self.assertEqual(self.floats(3, -1.5, 0.25, [0, 1, 2, 3, 8]), [struct.pack("<I", b) for b in (
+            0x7fc00000, 0xff800000, 0x7f800000)] + [struct.pack("<f", f) for f in (-1.5, -0.25)])
+        self.assertEqual(self.floats(3, 0, 1e300, [4, 2**32 - 1]), [struct.pack("<I", 0x7f7fffff)] * 2)
+        self.assertEqual(self.floats(3, -1e300, 1, [4]), [struct.pack("<I", 0xff7fffff)])
+        for lo, step in ((math.nan, 1), (math.inf, 1), (0, 0), (0, -1), (0, math.nan), (0, math.inf)):
+            with self.subTest(lo=lo, step=step), self.assertRaisesRegex(Refused, "steps"):
+                self.floats(3, lo, step, [3])
+
+
+# ---- With tools ------------------------------------------------------------------------------------------------------
+
+DIMS = ((1, 1, 1), (17, 5, 33), (1, 40, 2), (9, 8, 7))
+SHAPES = ((16, "on"), (8, "on"), (8, "off"))
+
+
+def smooth(noise, dims, most):
+    """Waves and a little noise, of whole numbers from 0 to most; some voxels are far off."""
+    for z, y, x in itertools.product(*map(range, dims[::-1])):
+        wave = math.sin(x / 5 + y / 7) + math.cos(z / 6 - y / 9)
+        yield noise.randrange(most + 1) if noise.random() < 0.01 else int((wave + 2) / 4 * (most - 3)) + noise.randrange(3)
+
+
+def few(noise, dims, most):
+    values = sorted(noise.randrange(most + 1) for _ in range(5))
+    for z, y, x in itertools.product(*map(range, dims[::-1])):
+        yield values[(x // 4 + y // 3 + z // 5) % 4 if noise.random() < 0.9 else 4]
+
+
+def constant(noise, dims, most):
+    value = noise.randrange(most + 1)
+    return (value for _ in range(dims[0] * dims[1] * dims[2]))
+
+
+def as_raw(values, kind):
+    if kind == "bit":
+        return raw_file(bytes(values), "bit")
+    if kind == "f32":
+        return b"".join(struct.pack("<f", v / 4096 - 1) for v in values)
+    size = int(kind[1:]) // 8
+    return raw_file(b"".join(v.to_bytes(size, "little") for v in values), kind)
+
+
+# Of a .raw file; the greatest number that is made of it, errors that are allowed.
+KINDS = (("u8", 255, (0, 1, 7)), ("i8", 255, (0,)), ("u16", 65535, (0, 300)), ("i16", 4095, (0, 2)),
+         ("f32", 20000, (0, 1e-3, 0.25)), ("bit", 1, (0,)))
+
+
+@unittest.skipUnless(BIN, "VOXKIT_BIN is not set")
+class Tools(ToolCase):
+    def encode(self, source, *options):
+        """Without loss unless the options say otherwise."""
+        options = options if "--max-error" in options else (*options, "--max-error", 0)
+        self.run_program(os.path.join(BIN, "svmm-encode"), source, "-f", "-o", self.path("x.svmm"), "--layout", "packed",
+                         *options)
+        return self.path("x.svmm")
+
+    def encode_raw(self, data, dims, kind, *options):
+        write(self.path("in.raw"), data)
+        return self.encode(self.path("in.raw"), "--dims", "%d,%d,%d" % dims, "--type", kind, *options)
+
+    def compare(self, file):
+        """All levels, decoded by both; returns the reference decoder's view of the file, and the voxels of level 0."""
+        packed = Packed(Container(read(file)))
+        first = None
+        for level in range(packed.count):
+            with self.subTest(level=level):
+                self.run_program(os.path.join(BIN, "vox-decode"), file, "-f", "-o", self.path("tool.raw"), "--level", level)
+                tool = read(self.path("tool.raw"))
+                reference = raw_file(packed.volume.samples(decode(packed, level)), packed.volume.sample)
+                first = reference if first is None else first
+                self.assertEqual(len(tool), len(reference))
+                different = [at for at in range(len(tool)) if tool[at] != reference[at]]
+                self.assertFalse(different, "{} bytes differ, the first at {}".format(len(different), different[:1]))
+        return packed, first
+
+    def test_sample_types(self):
+        noise = random.Random(1)
+        seen = set()
+        for (kind, most, errors), dims, content in itertools.product(KINDS, DIMS, (smooth, few, constant)):
+            data = as_raw(list(content(noise, dims, most)), kind) if kind != "bit" or content is not smooth else as_raw(
+                [v > 500 for v in smooth(noise, dims, 1000)], kind)
+            for error, (side, levels) in zip(itertools.cycle(errors), SHAPES * len(errors)):
+                if dims != (17, 5, 33) and (side, levels) != (8, "on"):
+                    continue
+                with self.subTest(kind=kind, dims=dims, content=content.__name__, error=error, page=side, levels=levels):
+                    file = self.encode_raw(data, dims, kind, "--max-error", error, "--levels", levels, "--page", side)
+                    packed, voxels = self.compare(file)
+                    self.assertEqual(packed.side, side)
+                    if error == 0:
+                        self.assertEqual(voxels, data)
+                    seen |= {(packed.codes, packed.models[0].wide, packed.models[0].has_palette, packed.models[0].bound > 0)}
+        # Every way of a page was gone.
+        self.assertLessEqual({(1, False, False, False), (1, False, False, True), (1, False, True, False),
+                              (2, True, False, False), (2, False, True, False), (3, False, False, False)}, seen)
+
+    def test_wide_numbers(self):
+        """Floats of any bits, numbers that are none, steps above 2^16; integers of 32 bits by their names."""
+        noise, dims = random.Random(2), (11, 9, 10)
+        wild = [noise.choice((noise.randrange(2**32), 0x7f800000, 0xff800000, 0x7fc00000, 0x80000000, 0x3f800000))
+                for _ in range(990)]
+        _, voxels = self.compare(self.encode_raw(struct.pack("<990I", *wild), dims, "f32", "--page", 8))
+        self.assertEqual(voxels, struct.pack("<990I", *wild))
+        waves = [1000 * v + noise.random() for v in smooth(noise, dims, 20000)]
+        waves[5:8] = math.nan, math.inf, -math.inf
+        packed, _ = self.compare(self.encode_raw(struct.pack("<990f", *waves), dims, "f32", "--max-error", 4))
+        self.assertEqual((packed.codes, packed.models[0].wide), (3, True))
+        names = [noise.choice((7, 4000000000, 65536, 12)) for _ in range(990)]
+        packed, voxels = self.compare(self.encode_raw(struct.pack("<990I", *names), dims, "u32", "--labels"))
+        self.assertEqual(voxels, struct.pack("<990I", *names))
+
+    def test_several_parts(self):
+        """More pages than a part has, as NRRD, with a value for nothing measured."""
+        dims, noise = (90, 100, 80), random.Random(3)
+        row = bytes(noise.randrange(9) for _ in range(90))
+        voxels = bytes(90 * 100 * 40) + row * 100 + bytes((4,)) * 9000 * 38 + row * 100
+        write(self.path("in.nrrd"), b"NRRD0004\ntype: uchar\ndimension: 3\nsizes: 90 100 80\nencoding: raw\nendian: little\n\n" + voxels)
+        packed, decoded = self.compare(self.encode(self.path("in.nrrd"), "--page", 8, "--fill", 4))
+        self.assertEqual(decoded, voxels)
+        self.assertIn((b"PAGE", 0, 1), packed.container.chunks)
+
+    def test_built_ins_and_the_program(self):
+        for source, options in (("marschner-lobb:21", ()), ("noise:23:2", ("--page", "8")), ("sphere:33", ("--levels", "off")),
+                                ("membrane:37,5,40:8", ("--max-error", "3"))):
+            with self.subTest(source=source):
+                file = self.encode(source, *options)
+                self.compare(file)
+                info = json.loads(self.run_program(sys.executable, DECODER, "--info", file).stdout)
+                said = json.loads(self.run_program(os.path.join(BIN, "vox-info"), file, "--json").stdout)
+                for key in ("dims", "voxel_format", "sample_type"):
+                    self.assertEqual(info[key], said[key])
+                last = len(info["levels"]) - 1
+                tool, reference = self.decode_both(DECODER, file, "good.raw", "--level", last)
+                self.assertEqual(tool, raw_file(reference, info["sample_type"]))
+                self.decode_both(DECODER, file, "none.raw", "--level", last + 1, expect=2)
+
+    def test_damaged_files_are_refused(self):
+        data = read(self.encode("membrane:20,9,5:3"))
+        damaged = [data[:length] for length in (0, 7, 64, 200, len(data) // 2, len(data) - 64, len(data) - 1)]
+        used = [c for c in Container(data).chunks.values() if c.kind not in (b"PAGE",) or c.index == 0]
+        for chunk in used:
+            for at in (chunk.offset, chunk.offset + chunk.length - 1):
+                damaged.append(data[:at] + bytes((data[at] ^ 16,)) + data[at + 1:])
+        for at in (0, 8, 10, 40, len(data) - 90, len(data) - 60, len(data) - 50, len(data) - 1):
+            damaged.append(data[:at] + bytes((data[at] ^ 1,)) + data[at + 1:])
+        for number, content in enumerate(damaged):
+            with self.subTest(number=number):
+                write(self.path("bad.svmm"), content)
+                self.assertEqual(self.decode_both(DECODER, self.path("bad.svmm"), "bad.raw", expect=3), [None, None])
+
+    def test_damage_with_right_checksums(self):
+        """Both refuse it, or both make the same of it."""
+        noise, dims = random.Random(4), (11, 9, 10)
+        refused = same = 0
+        for kind, content, most, error in (("u8", smooth, 255, 0), ("u8", smooth, 255, 2), ("u16", few, 65535, 0),
+                                           ("f32", smooth, 20000, 0), ("f32", smooth, 20000, 0.01)):
+            values = list(content(noise, dims, most))
+            data = as_raw([v + noise.random() for v in values] if kind == "f32" else values, kind)
+            good = Container(read(self.encode_raw(data, dims, kind, "--max-error", error, "--page", 8)))
+            chunks = [[*key, bytes(good.data[c.offset:c.offset + c.length])] for key, c in good.chunks.items()]
+            places = [i for i, c in enumerate(chunks) if c[0] in (b"PAKP", b"MODL") or c[:2] == [b"PAGE", 0]]
+            for change in range(60):
+                changed = [list(c) for c in chunks]
+                chunk = changed[noise.choice(places)]
+                content_bytes = bytearray(chunk[3])
+                for _ in range(1 + noise.randrange(2)):
+                    at = noise.randrange(min(len(content_bytes), 300) if noise.random() < 0.5 else len(content_bytes))
+                    content_bytes[at] = noise.choice((content_bytes[at] ^ 1 << noise.randrange(8), noise.randrange(256)))
+                if noise.random() < 0.1:
+                    del content_bytes[noise.randrange(len(content_bytes)):]
+                chunk[3] = bytes(content_bytes)
+                file = container(changed, version=good.version)
+                write(self.path("bad.svmm"), file)
+                with self.subTest(kind=kind, error=error, change=change, chunk=chunk[:3]):
+                    try:
+                        packed = Packed(Container(file))
+                        reference = raw_file(packed.volume.samples(decode(packed, 0)), packed.volume.sample)
+                    except Refused:
+                        reference = None
+                    tool = subprocess.run([os.path.join(BIN, "vox-decode"), self.path("bad.svmm"), "-f", "-o", self.path("bad.raw")],
+                                          stderr=subprocess.PIPE)
+                    self.assertEqual(tool.returncode, 0 if reference else 3, tool.stderr)
+                    if reference:
+                        self.assertEqual(read(self.path("bad.raw")), reference)
+                    refused, same = refused + (reference is None), same + (reference is not None)
+        self.assertGreater(min(refused, same), 20)
+
+
+if __name__ == "__main__":
+    unittest.main()
