@@ -3,9 +3,12 @@
 #include <fmt/core.h>
 
 #include <algorithm>
+#include <atomic>
 #include <cmath>
 #include <cstring>
 #include <functional>
+#include <memory>
+#include <string>
 #include <utility>
 #include <vector>
 
@@ -174,6 +177,29 @@ Result<std::unique_ptr<Buffer>> slice_buffer(const VolumeSource& source, Context
                           ctx);
 }
 
+/// Of integers that floats of 32 bits may not hold, it is said that they are rounded.
+void note_rounding(const VolumeInfo& from, Context& ctx) {
+  constexpr double most = 0x1p24;
+  if (is_color(from.format) || from.format == VoxelFormat::float32) return;
+  const double lo = from.sample(0), hi = from.labels ? from.sample(0x1p16) : lo + 65535;
+  if (lo < -most || hi > most)
+    ctx.note("integers of more than 24 bits become the nearest 32-bit floats, which may be equal");
+}
+
+/// Says once what becomes of NaN and infinities in integers.
+class NonFiniteNote {
+ public:
+  explicit NonFiniteNote(const Context& ctx)
+      : note_(ctx.note), said_(std::make_shared<std::atomic<bool>>(false)) {}
+  void operator()() const {
+    if (!said_->exchange(true)) note_("NaN and -infinity become the least integer, infinity the greatest");
+  }
+
+ private:
+  std::function<void(const std::string&)> note_;
+  std::shared_ptr<std::atomic<bool>> said_;
+};
+
 Result<std::unique_ptr<VolumeSource>> converted(std::unique_ptr<VolumeSource> source, const VolumeInfo& info,
                                                 RowFunction row, Context& ctx) {
   VOX_TRY(auto slice, slice_buffer(*source, ctx));
@@ -322,6 +348,7 @@ Result<std::unique_ptr<VolumeSource>> convert_type(std::unique_ptr<VolumeSource>
                                  values.lo, values.hi));
   // A flat volume has one value, which becomes the least of the type with a step of one.
   const double step = values.hi > values.lo ? (values.hi - values.lo) / (target.hi - target.lo) : 1;
+  if (type.format == VoxelFormat::float32) note_rounding(from, ctx);
   std::function<Voxel(double)> make;
   if (type.format == VoxelFormat::bitmap) {
     make = [type](double v) { return store(v < 0 || v > 0 ? 1 : 0, type); };
@@ -330,7 +357,8 @@ Result<std::unique_ptr<VolumeSource>> convert_type(std::unique_ptr<VolumeSource>
   } else if (from.format == VoxelFormat::bitmap && type.format == VoxelFormat::rgba32) {
     make = [type](double v) { return store(v > 0 ? 255 : 0, type); };
   } else if (stretch) {
-    make = [type, target, values](double v) {
+    make = [type, target, values, note = NonFiniteNote(ctx)](double v) {
+      if (!std::isfinite(v)) note();
       if (!(v > values.lo)) return store(target.lo, type);  // NaN too
       if (v >= values.hi) return store(values.hi > values.lo ? target.hi : target.lo, type);
       // One division of (for integers) exact numbers: the quotient is never rounded across a half.
@@ -338,7 +366,8 @@ Result<std::unique_ptr<VolumeSource>> convert_type(std::unique_ptr<VolumeSource>
       return store(target.lo + std::floor(scaled + 0.5), type);
     };
   } else {
-    make = [type, target](double v) {
+    make = [type, target, note = NonFiniteNote(ctx)](double v) {
+      if (!std::isfinite(v)) note();
       return store(std::isnan(v) ? target.lo : std::clamp(std::floor(v + 0.5), target.lo, target.hi), type);
     };
   }
@@ -368,6 +397,7 @@ Result<std::unique_ptr<VolumeSource>> apply_scale(std::unique_ptr<VolumeSource> 
   info.range.reset();
   info.labels.reset();
   info.wide_base = 0;
+  note_rounding(from, ctx);
   const auto make = [slope = from.slope, intercept = from.intercept](double v) {
     return Voxel::of(static_cast<float>(slope * v + intercept));
   };

@@ -179,23 +179,29 @@ struct VolumeInfo {
   /// The sample that a stored value stands for. Of labels: a stored value beyond the table stands for the
   /// last.
   double sample(double stored) const {
-    if (!labels) return stored - static_cast<double>(bias());
+    if (!labels) return has_wide_base() ? base_value() + stored : stored - static_cast<double>(bias());
     const int64_t label = (*labels)[std::min(static_cast<size_t>(stored), labels->size() - 1)];
     return sample_type == SampleType::u64 ? static_cast<double>(static_cast<uint64_t>(label))
                                           : static_cast<double>(label);
   }
   /// The stored value of a sample; of labels: that of the first one that is not below it.
   double stored(double value) const {
-    if (!labels) return value + static_cast<double>(bias());
+    if (!labels) return has_wide_base() ? value - base_value() : value + static_cast<double>(bias());
     double index = 0;
     while (index + 1 < static_cast<double>(labels->size()) && sample(index) < value) ++index;
     return index;
   }
-  /// What was added to samples to store them, where there is no table of labels.
+  /// The sample that 0 stands for is `wide_base`, as the bits of a u64 or of a signed integer.
+  bool has_wide_base() const {
+    return is_wide(sample_type) && format != VoxelFormat::float32 && !is_color(format);
+  }
+  double base_value() const {
+    return sample_type == SampleType::u64 ? static_cast<double>(static_cast<uint64_t>(wide_base))
+                                          : static_cast<double>(wide_base);
+  }
+  /// What was added to samples to store them, modulo 2^64, where there is no table of labels.
   int64_t bias() const {
-    return is_color(format)                                         ? 0
-           : is_wide(sample_type) && format != VoxelFormat::float32 ? -wide_base
-                                                                    : storage_bias(sample_type);
+    return is_color(format) ? 0 : has_wide_base() ? -wide_base : storage_bias(sample_type);
   }
 };
 

@@ -162,7 +162,13 @@ class Comparison {
         const A stored_a = load_le<A>(a + i * static_cast<int64_t>(sizeof(A)));
         const B stored_b = load_le<B>(b + i * static_cast<int64_t>(sizeof(B)));
         const double va = values_a_(stored_a), vb = values_b_(stored_b);
-        double d = va == vb ? 0 : std::abs(va - vb);
+        double d;
+        if constexpr (std::is_integral_v<A> && std::is_integral_v<B>) {
+          const __int128 difference = values_a_.whole(stored_a) - values_b_.whole(stored_b);
+          d = static_cast<double>(difference < 0 ? -difference : difference);
+        } else {
+          d = va == vb ? 0 : std::abs(va - vb);
+        }
         if (std::isnan(d)) d = std::isnan(va) && std::isnan(vb) ? 0 : infinity;
         part.real.squares += d * d;
         part.real.absolute += d;
@@ -221,19 +227,34 @@ class Comparison {
 
   /// From stored values to samples.
   struct Values {
-    explicit Values(const VolumeInfo& info) : bias(info.bias()) {
+    explicit Values(const VolumeInfo& info) {
+      const auto value = [&](int64_t bits) -> __int128 {
+        return info.sample_type == SampleType::u64 ? static_cast<__int128>(static_cast<uint64_t>(bits))
+                                                   : bits;
+      };
+      bias = info.has_wide_base() ? -value(info.wide_base) : info.bias();
       if (!info.labels) return;
-      for (size_t i = 0; i < info.labels->size(); ++i) labels.push_back(info.sample(static_cast<double>(i)));
+      for (const int64_t label : *info.labels) labels.push_back(value(label));
     }
     /// Whether all of them, and their differences, are 32 bit integers.
-    bool is_small() const { return labels.empty() && std::abs(bias) < int64_t{1} << 30; }
+    bool is_small() const {
+      constexpr __int128 most = int64_t{1} << 30;
+      return labels.empty() && bias < most && bias > -most;
+    }
+    /// Of integers, exactly.
+    __int128 whole(uint32_t stored) const {
+      return labels.empty() ? stored - bias
+                            : labels[std::min(static_cast<size_t>(stored), labels.size() - 1)];
+    }
     template <class T>
     double operator()(T stored) const {
-      if (labels.empty()) return static_cast<double>(stored) - static_cast<double>(bias);
-      return labels[std::min(static_cast<size_t>(stored), labels.size() - 1)];
+      if constexpr (std::is_integral_v<T>)
+        return static_cast<double>(whole(stored));
+      else
+        return static_cast<double>(stored);
     }
-    int64_t bias;
-    std::vector<double> labels;
+    __int128 bias;
+    std::vector<__int128> labels;
   };
 
   VoxelFormat a_, b_, error_;
@@ -251,9 +272,7 @@ VolumeDiff summarise(const Sums& sums, const VolumeInfo& a, int channels, std::o
   diff.voxels = *checked_voxels(a.dims);
   diff.voxel_format = a.format;
   const ValueRange samples = sums.lo <= sums.hi ? ValueRange{sums.lo, sums.hi} : ValueRange{0, 0};
-  diff.peak = peak ? *peak
-                   : full_scale(a, {samples.lo + static_cast<double>(a.bias()),
-                                    samples.hi + static_cast<double>(a.bias())});
+  diff.peak = peak ? *peak : full_scale(a, {a.stored(samples.lo), a.stored(samples.hi)});
   const double voxels = static_cast<double>(diff.voxels), samples_count = voxels * channels;
   diff.mse = (static_cast<double>(sums.whole.squares) + sums.real.squares) / samples_count;
   diff.rmse = std::sqrt(diff.mse);
@@ -314,7 +333,7 @@ VolumeInfo error_volume_info(const VolumeInfo& a, const VolumeInfo& b) {
     if (b.format == VoxelFormat::rgba32) info.format = b.format;
     return info;
   }
-  const bool same = a.format == b.format && a.bias() == b.bias() && !a.labels && !b.labels;
+  const bool same = a.format == b.format && a.sample(0) == b.sample(0) && !a.labels && !b.labels;
   info.format = same ? a.format : VoxelFormat::float32;
   switch (info.format) {
     case VoxelFormat::density8:

@@ -67,8 +67,10 @@ void declare(CommandLine& line, Options& o) {
       one_of(o.bound, {"local", "global"}));
   line.option("--alpha-weight", "on|off", "Weigh colours by alpha in averages (on; thesis: off)",
               one_of(o.alpha_weight, {"on", "off"}));
-  declare_range_option(line, o.range,
-                       "Sample values of 16 bit and float volumes that are full scale (default: measured)");
+  declare_range_option(
+      line, o.range,
+      "Sample values of 16 bit and float volumes that are full scale (default: 0 to as many bits as the "
+      "greatest sample needs; of floats, measured)");
   declare_zstd(line, o.zstd);
   line.flag("--verify",
             "Decode and compare before the output appears; exit 1 if the promised bound is broken", o.verify);

@@ -118,7 +118,9 @@ Result<int> work(const Options& o, Run& run) {
   if (input.color && !o.roi) VOX_CHECK(input.color->check(run.ctx));
   auto source = std::move(input.source);
   if (o.roi) {
-    const VolumeInfo whole = input.svmm ? input.svmm->info() : source->info();
+    const VolumeInfo whole = input.svmm     ? input.svmm->info()
+                             : input.packed ? input.packed->info()
+                                            : source->info();
     const Index3 dims = whole.dims;
     if (!whole.box().contains(*o.roi))
       return bad_usage(
@@ -126,7 +128,9 @@ Result<int> work(const Options& o, Run& run) {
                       dims.y, dims.z));
     // Every voxel of the level that the box touches.
     const int64_t factor =
-        input.svmm ? static_cast<int64_t>(input.svmm->levels()[static_cast<size_t>(o.level)].mip_factor) : 1;
+        input.svmm     ? static_cast<int64_t>(input.svmm->levels()[static_cast<size_t>(o.level)].mip_factor)
+        : input.packed ? int64_t{1} << o.level
+                       : 1;
     const Box part{o.roi->lo / factor, (o.roi->hi + (factor - 1)) / factor};
     VOX_TRY(source, crop(std::move(source), part, run.ctx));
   }

@@ -106,7 +106,8 @@ Status check_mesh(Mesh& mesh, const std::string& path) {
   for (glm::vec4& color : mesh.colors) bring_into_range(color);
   for (MeshMaterial& material : mesh.materials) {
     bring_into_range(material.color);
-    material.alpha_cutoff = within_one(material.alpha_cutoff);
+    // Above 1 nothing is there, however opaque.
+    if (!(material.alpha_cutoff > 1)) material.alpha_cutoff = within_one(material.alpha_cutoff);
     for (int c = 0; c < 3; ++c)
       material.emission[c] = material.emission[c] > 0 ? std::min(material.emission[c], 1e6f) : 0;
   }

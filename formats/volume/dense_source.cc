@@ -71,7 +71,7 @@ void unpack_bits(const std::byte* in, uint64_t first, int64_t count, std::byte* 
   while (i < end) one();
 }
 
-const std::string rounding_note = "64-bit floats are rounded to 32 bits";
+const std::string rounding_note = "64-bit floats are rounded to 32 bits; those beyond 3.4e38 become infinite";
 
 /// Whether some double is not a float. NaN may differ in its payload.
 Result<bool> rounds_doubles(std::span<const std::byte> samples, bool big_endian, Context& ctx) {

@@ -278,9 +278,12 @@ Result<PackedParams> encode_packed(VolumeSource& source, const PackedOptions& op
   if (options.max_error >= (floats ? 1e300 : 0x1p31))
     return bad_usage(fmt::format("--max-error {}: expected less than 2^31", options.max_error));
   if (options.max_error > 0 && (info.is_labels || info.labels))
-    return bad_usage("--max-error: labels have no values between them: expected 0");
+    return bad_usage(
+        "labels have no values between them: expected a bound of 0 (--max-error 0 or --quality 100)");
   if (options.max_error >= 1 && info.fill && !floats)
-    return bad_usage("--max-error: integers with a fill value: expected 0, so that it comes back as it is");
+    return bad_usage(
+        "integers with a fill value, which is to come back as it is: expected a bound of 0 (--max-error 0 or "
+        "--quality 100)");
   if (source.forward_only()) return fail(ErrorCode::internal, {}, "a source that was not spooled");
   return Encoder(source, options, sink, ctx).run();
 }

@@ -10,6 +10,7 @@
 #include <cstring>
 #include <exception>
 #include <new>
+#include <system_error>
 
 #include "formats/output_file.h"
 
@@ -111,6 +112,11 @@ int run_tool(int argc, char** argv, const std::string& tool, const std::string& 
     }();
   } catch (const std::bad_alloc&) {
     result = fail(ErrorCode::limit, {}, "out of memory: use --max-memory or fewer --threads");
+  } catch (const std::system_error& e) {
+    // Of threads that cannot be had; of memory for them, as a rule.
+    const bool resources = e.code() == std::errc::resource_unavailable_try_again;
+    result = resources ? fail(ErrorCode::limit, {}, "no memory for threads: use fewer --threads")
+                       : fail(ErrorCode::internal, {}, fmt::format("a bug of ours: {}", e.what()));
   } catch (const std::exception& e) {
     result = fail(ErrorCode::internal, {}, fmt::format("a bug of ours: {}", e.what()));
   } catch (...) {
