@@ -36,25 +36,28 @@ bool solve_definite(std::array<std::array<double, tap_count>, tap_count>& a, std
 
 }  // namespace
 
-Fit::Fit(uint32_t greatest, uint32_t max_error)
-    // Weights need no more than 20 bits of a sample.
-    : shift_(std::max(0, static_cast<int>(std::bit_width(greatest)) - 20)), equations_(class_count) {
+Fit::Fit(Classes classes, uint32_t greatest, uint32_t max_error)
+    : classes_(classes),
+      // Weights need no more than 20 bits of a sample.
+      shift_(std::max(0, static_cast<int>(std::bit_width(greatest)) - 20)),
+      equations_(static_cast<size_t>(classes.count())) {
   const double error = static_cast<double>(max_error >> shift_);
   quiet_ = 16 * (16 + error * error);
 }
 
 void Fit::add(std::span<const FitPage> pages, double noise) {
   for (int i = 0; i < shift_; ++i) noise /= 4;
-  std::vector<Equations> sums(class_count);
+  std::vector<Equations> sums(equations_.size());
   for (const FitPage& page : pages) add_page(page, sums);
-  for (size_t c = 0; c < class_count; ++c) {
+  for (size_t c = 0; c < sums.size(); ++c) {
     Equations& total = equations_[c];
+    const double own = noise * sums[c].weight;
     // Of two taps' differences from a third, the noise is twice that of one, and once in common.
-    const double common = noise * sums[c].weight;
+    const double common = classes_.parents ? 0 : own;
     for (size_t i = 0; i < tap_count; ++i) {
       for (size_t j = i; j < tap_count; ++j)
-        total.products[i][j] =
-            total.products[i][j] / 2 + sums[c].products[i][j] + common + (i == j ? common : 0);
+        total.products[i][j] = total.products[i][j] / 2 + sums[c].products[i][j] + common +
+                               (i == j && i < parent_tap ? own : 0);
       total.targets[i] = total.targets[i] / 2 + sums[c].targets[i] + common;
     }
     total.weight = total.weight / 2 + sums[c].weight;
@@ -67,12 +70,19 @@ void Fit::add_page(const FitPage& page, std::vector<Equations>& all) const {
     const int cx = std::clamp(x, 0, e.nx - 1), cy = std::clamp(y, 0, e.ny - 1), cz = std::max(z, 0);
     return static_cast<double>(page.decoded[static_cast<size_t>((cz * e.ny + cy) * e.nx + cx)] >> shift_);
   };
+  const auto parent = [&](int x, int y, int z) {
+    const Parent<uint32_t>& p = page.parent;
+    const int cx = std::clamp(p.x + x, 0, p.extent.nx - 1), cy = std::clamp(p.y + y, 0, p.extent.ny - 1),
+              cz = std::clamp(p.z + z, 0, p.extent.nz - 1);
+    return static_cast<double>(
+        p.samples[static_cast<size_t>((cz * p.extent.ny + cy) * p.extent.nx + cx)] >> shift_);
+  };
   size_t at = 0;
   for (int z = 0; z < e.nz; ++z)
     for (int y = 0; y < e.ny; ++y)
       for (int x = 0; x < e.nx; ++x, ++at) {
-        const int voxel_class = class_of(place(x, e.nx), place(y, e.ny), z > 0);
-        const int rest = rest_tap(voxel_class);
+        const int voxel_class = classes_.of(classes_.along(x, e.nx), classes_.along(y, e.ny), z);
+        const int rest = classes_.rest(voxel_class);
         if (rest < 0) continue;
         Row taps{};
         for (int dy = -1; dy <= 1; ++dy)
@@ -83,11 +93,20 @@ void Fit::add_page(const FitPage& page, std::vector<Equations>& all) const {
         taps[second_left_tap] = decoded(x - 2, y, z);
         taps[second_above_tap] = decoded(x, y - 2, z);
         taps[second_behind_tap] = decoded(x, y, z - 2);
+        if (classes_.parents) {
+          taps[parent_tap] = parent(x / 2, y / 2, z / 2);
+          taps[parent_tap + 1] = parent(x / 2 - 1, y / 2, z / 2);
+          taps[parent_tap + 2] = parent(x / 2 + 1, y / 2, z / 2);
+          taps[parent_tap + 3] = parent(x / 2, y / 2 - 1, z / 2);
+          taps[parent_tap + 4] = parent(x / 2, y / 2 + 1, z / 2);
+          taps[parent_tap + 5] = parent(x / 2, y / 2, z / 2 - 1);
+          taps[parent_tap + 6] = parent(x / 2, y / 2, z / 2 + 1);
+        }
         const double origin = taps[static_cast<size_t>(rest)];
         double least = 0, greatest = 0;
         for (int t = 0; t < tap_count; ++t) {
           double& tap = taps[static_cast<size_t>(t)];
-          tap = has_tap(voxel_class, t) ? tap - origin : 0;
+          tap = classes_.has(voxel_class, t) ? tap - origin : 0;
           least = std::min(least, tap);
           greatest = std::max(greatest, tap);
         }
@@ -96,30 +115,31 @@ void Fit::add_page(const FitPage& page, std::vector<Equations>& all) const {
         Equations& sums = all[static_cast<size_t>(voxel_class)];
         sums.weight += weight;
         if (range == 0) continue;
-        for (size_t i = 0; i < tap_count; ++i) {
+        const auto count = static_cast<size_t>(taps_of(classes_.parents));
+        for (size_t i = 0; i < count; ++i) {
           const double weighted = weight * taps[i];
           sums.targets[i] += weighted * target;
-          for (size_t j = i; j < tap_count; ++j) sums.products[i][j] += weighted * taps[j];
+          for (size_t j = i; j < count; ++j) sums.products[i][j] += weighted * taps[j];
         }
       }
 }
 
-std::array<Weights, class_count> Fit::weights() const {
-  std::array<Weights, class_count> weights{};
-  for (int c = 0; c < class_count; ++c)
+std::array<Weights, most_classes> Fit::weights() const {
+  std::array<Weights, most_classes> weights{};
+  for (int c = 0; c < classes_.count(); ++c)
     weights[static_cast<size_t>(c)] = solve(equations_[static_cast<size_t>(c)], c);
   return weights;
 }
 
-Weights Fit::solve(const Equations& equations, int voxel_class) {
+Weights Fit::solve(const Equations& equations, int voxel_class) const {
   Weights weights{};
-  const int rest = rest_tap(voxel_class);
+  const int rest = classes_.rest(voxel_class);
   if (rest < 0) return weights;
   weights[static_cast<size_t>(rest)] = weight_one;
   std::array<size_t, tap_count> taps;
   size_t n = 0;
   for (int t = 0; t < tap_count; ++t)
-    if (t != rest && has_tap(voxel_class, t)) taps[n++] = static_cast<size_t>(t);
+    if (t != rest && classes_.has(voxel_class, t)) taps[n++] = static_cast<size_t>(t);
   if (n == 0 || equations.weight == 0) return weights;
 
   std::array<Row, tap_count> a;
@@ -137,7 +157,7 @@ Weights Fit::solve(const Equations& equations, int voxel_class) {
   int32_t left = weight_one, size = 0;
   Weights fitted{};
   for (size_t i = 0; i < n; ++i) {
-    if (!(std::abs(b[i]) < 7)) return weights;
+    if (!(std::abs(b[i]) < 8)) return weights;
     const auto weight = static_cast<int32_t>(std::floor(b[i] * weight_one + 0.5));
     fitted[taps[i]] = static_cast<int16_t>(weight);
     left -= weight;

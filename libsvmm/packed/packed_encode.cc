@@ -4,9 +4,11 @@
 
 #include <cmath>
 #include <cstring>
+#include <limits>
 #include <numeric>
 
 #include "formats/copy.h"
+#include "formats/mapped_file.h"
 #include "formats/parallel.h"
 #include "formats/reservation.h"
 #include "formats/volume_chunks.h"
@@ -99,6 +101,37 @@ std::vector<std::pair<uint64_t, uint64_t>> runs_of(const PageGrid& grid, uint64_
   return runs;
 }
 
+/// The codes of a coarser level as they were decoded, in a temporary file, page by page.
+class DecodedLevel {
+ public:
+  DecodedLevel(int level, const PageGrid& grid, int code_bytes)
+      : level_(level), grid_(grid), stride_(static_cast<size_t>(grid.side * grid.side * grid.side * code_bytes)) {}
+  int level() const { return level_; }
+  size_t page_bytes() const { return stride_; }
+  /// Pages in order, each of `page_bytes()`.
+  Status write(std::span<const std::byte> pages) { return file_.write(pages); }
+  Status finish() {
+    VOX_TRY(mapped_, file_.map());
+    return {};
+  }
+  /// The parents of a page of the next finer level.
+  template <class T>
+  page::Parent<T> parent_of(Index3 child) const {
+    const uint64_t number = grid_.number(child / int64_t{2});
+    page::Parent<T> parent = placed<T>(child, grid_);
+    parent.samples = {reinterpret_cast<const T*>(mapped_->bytes().data() + number * stride_),
+                      static_cast<size_t>(parent.extent.voxels())};
+    return parent;
+  }
+
+ private:
+  int level_;
+  PageGrid grid_;
+  size_t stride_;
+  TemporaryFile file_{"a coarser level"};
+  std::shared_ptr<const MappedFile> mapped_;
+};
+
 class Encoder {
  public:
   Encoder(VolumeSource& source, const PackedOptions& options, const ByteSink& sink, Context& ctx)
@@ -116,16 +149,17 @@ class Encoder {
     VOX_CHECK(prepare());
     VOX_CHECK(add_volume_info(container_, info_));
     VOX_CHECK(container_.add(packed_kind, 0, 0, pack_params(params_)));
-    // The model of coarser levels is fitted to the largest of them.
-    std::optional<page::Model> coarse;
-    if (params_.levels > 1) {
-      VOX_TRY(coarse, fit(1));
-      VOX_CHECK(container_.add(model_kind, 1, 0, coarse->serialise()));
+    // The coarsest level has no parents; the model of those between is fitted to the largest of them.
+    const int top = params_.levels - 1;
+    std::optional<page::Model> model;
+    for (int level = top; level >= 0; --level) {
+      if (level == top || level == top - 1 || level == 0) {
+        const int fitted = level == 0 || level == top ? level : 1;
+        VOX_TRY(model, fit(fitted));
+        VOX_CHECK(container_.add(model_kind, static_cast<uint32_t>(fitted), 0, model->serialise()));
+      }
+      VOX_CHECK(encode(level, *model));
     }
-    for (int level = params_.levels - 1; level > 0; --level) VOX_CHECK(encode(level, *coarse));
-    VOX_TRY(const page::Model fine, fit(0));
-    VOX_CHECK(container_.add(model_kind, 0, 0, fine.serialise()));
-    VOX_CHECK(encode(0, fine));
     VOX_CHECK(container_.finish());
     return params_;
   }
@@ -185,21 +219,55 @@ class Encoder {
   /// Bytes of these pages, and of the model.
   Result<uint64_t> sampled_bytes(int level, const page::Model& model) {
     std::vector<std::byte> bytes = model.serialise();
-    VOX_CHECK(sample_pages(level, [&](uint64_t, auto codes, page::Extent extent) {
-      return page::encode_page(model, codes, extent, bytes);
+    VOX_CHECK(sample_pages(level, [&](uint64_t number, auto codes, page::Extent extent) -> Status {
+      using T = std::remove_const_t<typename decltype(codes)::element_type>;
+      std::vector<T> codes_above;
+      page::Parent<T> parent;
+      if (model.has_parents()) {
+        VOX_TRY(parent, parent_of(level, number, codes_above));
+      }
+      return page::encode_page(model, codes, extent, bytes, parent);
     }));
     return bytes.size();
+  }
+
+  /// The parents of a page: as they were decoded, or, where that is still to come, about so, in `room`.
+  template <class T>
+  Result<page::Parent<T>> parent_of(int level, uint64_t number, std::vector<T>& room) {
+    const Index3 child = grid(level).index(number);
+    if (decoded_ && decoded_->level() == level + 1) return decoded_->parent_of<T>(child);
+    const PageGrid above = grid(level + 1);
+    const uint64_t parent_number = above.number(child / int64_t{2});
+    const auto bound = info_.format == VoxelFormat::float32 ? 0u : static_cast<uint32_t>(params_.max_error);
+    const uint64_t step = 2 * uint64_t{bound} + 1;
+    VOX_CHECK(PageReader(source(level + 1), above, params_)
+                  .read(parent_number, parent_number + 1, [&](uint64_t, auto codes, page::Extent) -> Status {
+                    for (const auto code : codes)
+                      room.push_back(static_cast<T>(std::min<uint64_t>(
+                          (code + bound) / step * step, std::numeric_limits<T>::max())));
+                    return {};
+                  }));
+    page::Parent<T> parent = placed<T>(child, above);
+    parent.samples = room;
+    return parent;
   }
 
   Result<page::Model> fit(int level) {
     page::ModelBuilder builder;
     VOX_TRY(const Reservation memory, Reservation::take(most_samples * page::max_voxels * sizeof(uint32_t),
                                                         "pages to fit a model to", ctx_));
-    VOX_CHECK(sample_pages(level, [&](uint64_t, auto codes, page::Extent extent) -> Status {
-      builder.add(codes, extent);
+    page::ModelOptions options;
+    options.parents = level + 1 < params_.levels;
+    VOX_CHECK(sample_pages(level, [&](uint64_t number, auto codes, page::Extent extent) -> Status {
+      using T = std::remove_const_t<typename decltype(codes)::element_type>;
+      std::vector<T> room;
+      page::Parent<T> parent;
+      if (options.parents) {
+        VOX_TRY(parent, parent_of(level, number, room));
+      }
+      builder.add(codes, extent, parent);
       return {};
     }));
-    page::ModelOptions options;
     if (info_.format == VoxelFormat::float32) {
       const bool steps = params_.map.kind == CodeKind::steps;
       options.max_sample = steps ? params_.map.code(static_cast<float>(survey_.range().hi)) : 0xffffffff;
@@ -214,6 +282,7 @@ class Encoder {
       // Of few values all may take fewer bytes than values near to them.
       if (options.max_error > 0 && values.size() <= most_exact_values && level == 0) {
         page::ModelOptions exact;
+        exact.parents = options.parents;
         exact.max_sample = options.max_sample;
         exact.values = values;
         VOX_TRY(const page::Model bounded, builder.build(options));
@@ -228,6 +297,8 @@ class Encoder {
 
   Status encode(int level, const page::Model& model) {
     const PageGrid pages = grid(level);
+    auto decoded = std::make_unique<DecodedLevel>(level, pages, code_bytes(info_.format));
+    std::vector<std::byte> batch;  // of decoded pages
     const auto batch_parts = static_cast<uint64_t>(2 * ctx_.threads);
     for (uint64_t part = 0; part < pages.parts(); part += batch_parts) {
       const uint64_t end_part = std::min(part + batch_parts, pages.parts()),
@@ -235,13 +306,22 @@ class Encoder {
                      last = std::min(end_part * pages.pages_a_part(), pages.pages());
       std::vector<std::vector<std::byte>> encoded(last - first);
       const auto runs = runs_of(pages, first, last);
+      if (level > 0) batch.resize((last - first) * decoded->page_bytes());
       VOX_CHECK(parallel_for(ctx_, static_cast<int64_t>(runs.size()), [&](int64_t i) -> Status {
         PageReader reader(source(level), pages, params_);
         const auto [begin, end] = runs[static_cast<size_t>(i)];
         return reader.read(begin, end, [&](uint64_t number, auto codes, page::Extent extent) {
-          return page::encode_page(model, codes, extent, encoded[number - first]);
+          using T = std::remove_const_t<typename decltype(codes)::element_type>;
+          page::Parent<T> parent;
+          if (model.has_parents()) parent = decoded_->parent_of<T>(pages.index(number));
+          std::span<T> kept;
+          if (level > 0)
+            kept = {reinterpret_cast<T*>(batch.data() + (number - first) * decoded->page_bytes()),
+                    codes.size()};
+          return page::encode_page(model, codes, extent, encoded[number - first], parent, kept);
         });
       }));
+      if (level > 0) VOX_CHECK(decoded->write(batch));
       std::span<const std::vector<std::byte>> left = encoded;
       for (uint64_t p = part; p < end_part; ++p) {
         const uint64_t count = pages.pages_of(p);
@@ -251,6 +331,8 @@ class Encoder {
       source(level).release(pages.box(first).lo.z, pages.box(last - 1).lo.z);
       if (level == 0) ctx_.progress(static_cast<double>(last) / static_cast<double>(pages.pages()));
     }
+    if (level > 0) VOX_CHECK(decoded->finish());
+    decoded_ = std::move(decoded);
     return {};
   }
 
@@ -260,6 +342,7 @@ class Encoder {
   PackedParams params_;
   Survey survey_;
   std::vector<std::unique_ptr<VolumeSource>> coarser_;
+  std::unique_ptr<DecodedLevel> decoded_;  ///< the level above that which comes next
   ContainerWriter container_;
 };
 
