@@ -4,6 +4,8 @@
 #include <bit>
 #include <cmath>
 
+#include "libpage/parent_rows.h"
+
 namespace voxkit::page {
 namespace {
 
@@ -94,13 +96,16 @@ void Fit::add_page(const FitPage& page, std::vector<Equations>& all) const {
         taps[second_above_tap] = decoded(x, y - 2, z);
         taps[second_behind_tap] = decoded(x, y, z - 2);
         if (classes_.parents) {
-          taps[parent_tap] = parent(x / 2, y / 2, z / 2);
-          taps[parent_tap + 1] = parent(x / 2 - 1, y / 2, z / 2);
-          taps[parent_tap + 2] = parent(x / 2 + 1, y / 2, z / 2);
-          taps[parent_tap + 3] = parent(x / 2, y / 2 - 1, z / 2);
-          taps[parent_tap + 4] = parent(x / 2, y / 2 + 1, z / 2);
-          taps[parent_tap + 5] = parent(x / 2, y / 2, z / 2 - 1);
-          taps[parent_tap + 6] = parent(x / 2, y / 2, z / 2 + 1);
+          const int px = x / 2, py = y / 2, pz = z / 2, dy = toward(y), dz = toward(z);
+          for (int dx = -1; dx <= 1; ++dx) {
+            const auto at_dx = static_cast<size_t>(parent_tap + 1 + dx);
+            taps[at_dx] = parent(px + dx, py, pz);
+            taps[at_dx + 3] = parent(px + dx, py + dy, pz);
+            taps[at_dx + 6] = parent(px + dx, py, pz + dz);
+            taps[at_dx + 9] = parent(px + dx, py + dy, pz + dz);
+          }
+          taps[parent_tap + 12] = parent(px, py - dy, pz);
+          taps[parent_tap + 13] = parent(px, py, pz - dz);
         }
         const double origin = taps[static_cast<size_t>(rest)];
         double least = 0, greatest = 0;

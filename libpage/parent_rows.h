@@ -13,6 +13,11 @@ namespace voxkit::page {
 /// The parents along a side of a page, and one before and one behind these.
 inline constexpr int parent_side = max_side / 2 + 2;
 
+/// Which neighbour of its parent a voxel is next to.
+constexpr int toward(int at) {
+  return at % 2 != 0 ? 1 : -1;
+}
+
 /// Parents as a model has them, twice along x, so that each stands where its children are.
 template <class Stored>
 struct ParentRows {
@@ -35,13 +40,15 @@ struct ParentRows {
           to[2 * x] = to[2 * x + 1] = stored(from[std::clamp(parent.x + x - 1, 0, e.nx - 1)]);
       }
   }
-  /// The rows of the parents of row (y, z), then those before and behind them along y and z.
-  std::array<const Stored*, 5> around(int y, int z) const {
+  /// Of row (y, z): the row of its parents; those next to its voxels along y, z and both; those on the other
+  /// side along y and z.
+  std::array<const Stored*, 6> around(int y, int z) const {
     const auto row = [&](int py, int pz) {
       return rows[static_cast<size_t>(pz + 1)][static_cast<size_t>(py + 1)].data() + row_start;
     };
-    const int py = y / 2, pz = z / 2;
-    return {row(py, pz), row(py - 1, pz), row(py + 1, pz), row(py, pz - 1), row(py, pz + 1)};
+    const int py = y / 2, pz = z / 2, dy = toward(y), dz = toward(z);
+    return {row(py, pz),           row(py + dy, pz), row(py, pz + dz),
+            row(py + dy, pz + dz), row(py - dy, pz), row(py, pz - dz)};
   }
 };
 

@@ -19,7 +19,7 @@ inline constexpr int left_tap = 12, second_left_tap = 13, second_above_tap = 14,
 /// and those beside it; 17 and 18, 19 and 20, 21 and 22: the voxel before and behind that along x, y, z, or
 /// where that is outside the page of parents, the nearest inside.
 inline constexpr int parent_tap = 16;
-inline constexpr int tap_count = 23;
+inline constexpr int tap_count = 30;
 inline constexpr int taps_of(bool parents) {
   return parents ? tap_count : causal_taps;
 }
@@ -65,7 +65,7 @@ struct Classes {
   /// The tap whose weight is what the others leave of `weight_one`: the parent, or else the nearest behind,
   /// above, or before; -1: this class has none, and is predicted as the model's background.
   constexpr int rest(int voxel_class) const {
-    for (const int tap : {parent_tap, 4, 10, left_tap})
+    for (const int tap : {parent_tap + 1, 4, 10, left_tap})
       if (has(voxel_class, tap)) return tap;
     return -1;
   }

@@ -99,11 +99,16 @@ template <class Width, class Rows>
   }
 }
 
-/// Activity from ranges and the magnitudes in earlier rows.
+/// Activity from the magnitudes in earlier rows, none in the first one, and the share of ranges.
 template <class Width>
-[[gnu::always_inline]] inline void find_activity(const ModelData& model, int y, int z,
-                                                 const Memory<Width>& memory, const Ranges<Width>& ranges,
+[[gnu::always_inline]] inline void find_activity(int y, int z, const Memory<Width>& memory,
+                                                 const std::array<uint16_t, max_side>& share,
                                                  RowPlan<Width>& plan) {
+  if (y == 0 && z == 0) {
+    for (size_t x = 0; x < max_side; ++x)
+      plan.activity[x] = std::min(share[x], static_cast<uint16_t>(most_row_activity));
+    return;
+  }
   const uint16_t* above = row_of(memory.magnitudes, std::max(y - 1, 0), z);
   const uint16_t* behind = row_of(memory.magnitudes, y, std::max(z - 1, 0));
   if (y == 0) above = behind;
@@ -111,8 +116,7 @@ template <class Width>
   for (int x = 0; x < max_side; ++x) {
     const auto at = static_cast<size_t>(x);
     const int activity = 2 * (above[x] + behind[x]) + above[x - 1] + above[x + 1] + behind[x - 1] +
-                         behind[x + 1] +
-                         Width::range_share(ranges.least[at], ranges.greatest[at], model.half_steps);
+                         behind[x + 1] + share[at];
     plan.activity[at] = static_cast<uint16_t>(std::min(activity, most_row_activity));
   }
   plan.activity[0] = static_cast<uint16_t>(
@@ -151,7 +155,11 @@ template <class Width>
   }
   Ranges<Width> ranges;
   find_ranges<Width>(rows, ranges);
-  find_activity(model, y, z, memory, ranges, plan);
+  std::array<uint16_t, max_side> share;
+  for (size_t x = 0; x < max_side; ++x)
+    share[x] = static_cast<uint16_t>(
+        Width::range_share(ranges.least[x], ranges.greatest[x], model.half_steps));
+  find_activity(y, z, memory, share, plan);
 }
 
 template <class Width>
@@ -167,7 +175,9 @@ template <class Width>
   const std::array<const Stored*, tap_count - 2> taps = {
       rows[0] - 1,    rows[0],    rows[0] + 1, rows[1] - 1, rows[1],        rows[1] + 1,    rows[2] - 1,
       rows[2],        rows[2] + 1, rows[3] - 1, rows[3],    rows[3] + 1,    rows[4],        rows[5],
-      parents[0],     parents[0] - 2, parents[0] + 2, parents[1], parents[2], parents[3], parents[4]};
+      parents[0] - 2, parents[0], parents[0] + 2, parents[1] - 2, parents[1], parents[1] + 2,
+      parents[2] - 2, parents[2], parents[2] + 2, parents[3] - 2, parents[3], parents[3] + 2,
+      parents[4], parents[5]};
   const auto number = [](size_t i) { return i < left_tap ? i : i + 2; };
   for (size_t x = 0; x < max_side; ++x) {
     Sum sum = rounding;
@@ -189,22 +199,29 @@ template <class Width>
   }
 
   plan.context = first_child(y, z) * activity_steps;
+  // Half of each range: with the parent of what is around a voxel, and of the parents.
   Ranges<Width> ranges;
   const bool first_row = y == 0 && z == 0;
   if (!first_row) find_ranges<Width>(rows, ranges);
+  std::array<uint16_t, max_side> share;
   for (int x = 0; x < max_side; ++x) {
     const auto at = static_cast<size_t>(x);
     const Stored parent = parents[0][x];
-    Stored low = first_row ? parent : ranges.least[at], high = first_row ? parent : ranges.greatest[at];
-    for (const Stored value : {parent, parents[0][x - 2], parents[0][x + 2], parents[1][x], parents[2][x],
-                               parents[3][x], parents[4][x]}) {
+    Stored low = parent, high = parent;
+    for (const Stored value :
+         {parents[0][x - 2], parents[0][x + 2], parents[1][x], parents[2][x], parents[4][x], parents[5][x]}) {
       low = value < low ? value : low;
       high = value > high ? value : high;
     }
-    ranges.least[at] = low;
-    ranges.greatest[at] = high;
+    Stored near_low = first_row ? parent : ranges.least[at];
+    Stored near_high = first_row ? parent : ranges.greatest[at];
+    near_low = parent < near_low ? parent : near_low;
+    near_high = parent > near_high ? parent : near_high;
+    share[at] = static_cast<uint16_t>((Width::range_share(low, high, model.half_steps) +
+                                       Width::range_share(near_low, near_high, model.half_steps)) /
+                                      2);
   }
-  find_activity(model, y, z, memory, ranges, plan);
+  find_activity(y, z, memory, share, plan);
 }
 
 template <class Width>
