@@ -181,6 +181,7 @@ template <class Width>
   const auto number = [](size_t i) { return i < left_tap ? i : i + 2; };
   for (size_t x = 0; x < max_side; ++x) {
     Sum sum = rounding;
+#pragma GCC unroll 32
     for (size_t i = 0; i < taps.size(); ++i)
       sum += static_cast<Sum>(weights[number(i)][x]) * static_cast<Sum>(taps[i][x]);
     plan.base[x] = sum;

@@ -15,6 +15,7 @@
 #include "libpage/page.h"
 #include "libsvmm/packed/halve.h"
 #include "libsvmm/packed/packed_layout.h"
+#include "libsvmm/packed/raster.h"
 #include "libsvmm/packed/survey.h"
 
 namespace voxkit::svmm {
@@ -28,8 +29,9 @@ constexpr size_t most_exact_values = 64;
 /// Reads pages of a level as codes.
 class PageReader {
  public:
-  PageReader(VolumeSource& source, const PageGrid& grid, const PackedParams& params)
-      : source_(source), grid_(grid), params_(params) {}
+  /// What is read goes through `raster`.
+  PageReader(VolumeSource& source, const PageGrid& grid, const PackedParams& params, const Raster& raster)
+      : source_(source), grid_(grid), params_(params), raster_(raster) {}
 
   /// Reads the pages `first` to `last`, which are in one row, and calls take(number, codes, extent) for each.
   template <class Take>
@@ -61,6 +63,8 @@ class PageReader {
     for (int64_t z = 0; z < size.z; ++z)
       for (int64_t y = 0; y < size.y; ++y, out += size.x)
         std::memcpy(out, in.row(y, z), static_cast<size_t>(size.x) * sizeof(T));
+    if (!raster_.empty())
+      for (T* code = codes; code != out; ++code) *code = static_cast<T>(raster_(*code));
     return take(number, std::span<const T>(codes, out), grid_.extent(number));
   }
   template <class Take>
@@ -85,6 +89,7 @@ class PageReader {
   VolumeSource& source_;
   const PageGrid& grid_;
   const PackedParams& params_;
+  const Raster& raster_;
   std::vector<std::byte> voxels_;
 };
 
@@ -166,6 +171,7 @@ class Encoder {
 
  private:
   VolumeSource& source(int level) { return level == 0 ? source_ : *coarser_[static_cast<size_t>(level - 1)]; }
+  const Raster& raster(int level) const { return level == 0 ? all_values_ : raster_; }
   PageGrid grid(int level) { return {source(level).info().dims, params_.page_side}; }
 
   /// The first pass.
@@ -182,6 +188,8 @@ class Encoder {
     }
     if (info_.format == VoxelFormat::float32) {
       VOX_CHECK(choose_map());
+    } else if (params_.max_error < 1 && !info_.is_labels && !info_.fill) {
+      raster_ = Raster(survey_.values());
     }
     return {};
   }
@@ -208,7 +216,7 @@ class Encoder {
   Status sample_pages(int level, const Take& take) {
     const PageGrid pages = grid(level);
     const uint64_t count = std::min(pages.pages(), most_samples);
-    PageReader reader(source(level), pages, params_);
+    PageReader reader(source(level), pages, params_, raster(level));
     const uint64_t all = pages.pages();
     uint64_t stride = all - all * 382 / 1000;  // near the golden section; all is below 2^50
     while (std::gcd(stride, all) != 1) ++stride;
@@ -240,7 +248,7 @@ class Encoder {
     const uint64_t parent_number = above.number(child / int64_t{2});
     const auto bound = info_.format == VoxelFormat::float32 ? 0u : static_cast<uint32_t>(params_.max_error);
     const uint64_t step = 2 * uint64_t{bound} + 1;
-    VOX_CHECK(PageReader(source(level + 1), above, params_)
+    VOX_CHECK(PageReader(source(level + 1), above, params_, raster(level + 1))
                   .read(parent_number, parent_number + 1, [&](uint64_t, auto codes, page::Extent) -> Status {
                     for (const auto code : codes)
                       room.push_back(static_cast<T>(std::min<uint64_t>(
@@ -279,6 +287,7 @@ class Encoder {
       // Means of voxels may be other values.
       const bool same_values = level == 0 || info_.is_labels || info_.format == VoxelFormat::bitmap;
       if (options.max_error == 0 && same_values) options.values = values;
+      if (level > 0 && !raster_.empty()) options.values = raster_.values();
       // Of few values all may take fewer bytes than values near to them.
       if (options.max_error > 0 && values.size() <= most_exact_values && level == 0) {
         page::ModelOptions exact;
@@ -308,7 +317,7 @@ class Encoder {
       const auto runs = runs_of(pages, first, last);
       if (level > 0) batch.resize((last - first) * decoded->page_bytes());
       VOX_CHECK(parallel_for(ctx_, static_cast<int64_t>(runs.size()), [&](int64_t i) -> Status {
-        PageReader reader(source(level), pages, params_);
+        PageReader reader(source(level), pages, params_, raster(level));
         const auto [begin, end] = runs[static_cast<size_t>(i)];
         return reader.read(begin, end, [&](uint64_t number, auto codes, page::Extent extent) {
           using T = std::remove_const_t<typename decltype(codes)::element_type>;
@@ -341,6 +350,8 @@ class Encoder {
   Context& ctx_;
   PackedParams params_;
   Survey survey_;
+  const Raster all_values_;
+  Raster raster_;  ///< of coarser levels
   std::vector<std::unique_ptr<VolumeSource>> coarser_;
   std::unique_ptr<DecodedLevel> decoded_;  ///< the level above that which comes next
   ContainerWriter container_;
