@@ -58,7 +58,8 @@ Status usable(const Model& model, const PageJob<T>& job) {
   if (!job.extent.valid() || job.out.size() != static_cast<size_t>(job.extent.voxels()))
     return bad_usage("a page decoded into another number of samples than its extent: expected room for all");
   if (model.has_parents() && !covers(job.parent, job.extent))
-    return bad_usage("a page decoded without the parents of all its voxels: expected those that its model has");
+    return bad_usage(
+        "a page decoded without the parents of all its voxels: expected those that its model has");
   if (model.max_sample() > std::numeric_limits<T>::max())
     return bad_usage("a page decoded into samples of too few bits: expected those of its model");
   return {};
@@ -138,8 +139,8 @@ Status decode_one(const Model& model, std::span<const std::byte> page, Extent ex
 
 }  // namespace
 
-Status decode_page(const Model& model, std::span<const std::byte> page, Extent extent,
-                   std::span<uint8_t> out, const Parent<uint8_t>& parent) {
+Status decode_page(const Model& model, std::span<const std::byte> page, Extent extent, std::span<uint8_t> out,
+                   const Parent<uint8_t>& parent) {
   return decode_one(model, page, extent, out, parent);
 }
 Status decode_page(const Model& model, std::span<const std::byte> page, Extent extent,

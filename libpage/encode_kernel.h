@@ -17,8 +17,8 @@ struct Residuals {
 };
 
 /// Quantises in closed loop: what is predicted from is what the decoder will have. Where `decoded` is given,
-/// it receives that. Samples are at most `model.max_value`; those of `parent` are, if the model has a palette,
-/// not numbers of its entries.
+/// it receives that. Samples are at most `model.max_value`; those of `parent` are, if the model has a
+/// palette, not numbers of its entries.
 template <class Width, class T>
 void find_residuals(const ModelData& model, std::span<const uint32_t> samples, Extent extent,
                     const Parent<T>& parent, Residuals& out, uint32_t* decoded = nullptr) {
@@ -39,9 +39,8 @@ void find_residuals(const ModelData& model, std::span<const uint32_t> samples, E
       uint16_t* magnitudes = row_of(memory.magnitudes, y, z);
       Left<Width> left;
       for (size_t x = 0; x < static_cast<size_t>(extent.nx); ++x, ++at) {
-        out.context[at] =
-            static_cast<uint8_t>(plan.context + (x % 2 != 0 ? next_child : 0) +
-                                 step_of_activity<1>[activity_at(plan, x, left)]);
+        out.context[at] = static_cast<uint8_t>(plan.context + (x % 2 != 0 ? next_child : 0) +
+                                               step_of_activity<1>[activity_at(plan, x, left)]);
         const int64_t mean = predict(plan, x, left);
         const int64_t predicted = std::clamp(mean >> weight_bits, lowest, highest);
         const int64_t value = int64_t{samples[at]} - Width::offset;

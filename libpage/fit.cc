@@ -36,6 +36,25 @@ bool solve_definite(std::array<std::array<double, tap_count>, tap_count>& a, std
   return true;
 }
 
+/// From fractions of one, with what they leave as that of the rest tap. False, and nothing changed, where
+/// they are larger than a model can hold.
+bool round_weights(std::span<const size_t> taps, const std::array<double, tap_count>& fractions, int rest,
+                   Weights& out) {
+  int32_t left = weight_one, size = 0;
+  Weights fitted{};
+  for (size_t i = 0; i < taps.size(); ++i) {
+    if (!(std::abs(fractions[i]) < 7)) return false;
+    const auto weight = static_cast<int32_t>(std::floor(fractions[i] * weight_one + 0.5));
+    fitted[taps[i]] = static_cast<int16_t>(weight);
+    left -= weight;
+    size += std::abs(weight);
+  }
+  if (std::abs(left) > INT16_MAX || size + std::abs(left) > most_weight) return false;
+  fitted[static_cast<size_t>(rest)] = static_cast<int16_t>(left);
+  out = fitted;
+  return true;
+}
+
 }  // namespace
 
 Fit::Fit(Classes classes, uint32_t greatest, uint32_t max_error)
@@ -58,8 +77,8 @@ void Fit::add(std::span<const FitPage> pages, double noise) {
     const double common = classes_.parents ? 0 : own;
     for (size_t i = 0; i < tap_count; ++i) {
       for (size_t j = i; j < tap_count; ++j)
-        total.products[i][j] = total.products[i][j] / 2 + sums[c].products[i][j] + common +
-                               (i == j && i < parent_tap ? own : 0);
+        total.products[i][j] =
+            total.products[i][j] / 2 + sums[c].products[i][j] + common + (i == j && i < parent_tap ? own : 0);
       total.targets[i] = total.targets[i] / 2 + sums[c].targets[i] + common;
     }
     total.weight = total.weight / 2 + sums[c].weight;
@@ -76,8 +95,8 @@ void Fit::add_page(const FitPage& page, std::vector<Equations>& all) const {
     const Parent<uint32_t>& p = page.parent;
     const int cx = std::clamp(p.x + x, 0, p.extent.nx - 1), cy = std::clamp(p.y + y, 0, p.extent.ny - 1),
               cz = std::clamp(p.z + z, 0, p.extent.nz - 1);
-    return static_cast<double>(
-        p.samples[static_cast<size_t>((cz * p.extent.ny + cy) * p.extent.nx + cx)] >> shift_);
+    return static_cast<double>(p.samples[static_cast<size_t>((cz * p.extent.ny + cy) * p.extent.nx + cx)] >>
+                               shift_);
   };
   size_t at = 0;
   for (int z = 0; z < e.nz; ++z)
@@ -147,30 +166,23 @@ Weights Fit::solve(const Equations& equations, int voxel_class) const {
     if (t != rest && classes_.has(voxel_class, t)) taps[n++] = static_cast<size_t>(t);
   if (n == 0 || equations.weight == 0) return weights;
 
-  std::array<Row, tap_count> a;
-  Row b;
-  for (size_t i = 0; i < n; ++i) {
-    for (size_t j = 0; j <= i; ++j) {
-      const auto [row, column] = std::minmax(taps[i], taps[j]);
-      a[i][j] = equations.products[row][column];
+  // Differences that hardly occur have no weight. Where weights are too large for their bits, as that of the
+  // parent of noise may be, all are held back more.
+  for (double damping = 1.0 / 4096; damping < 1; damping *= 4) {
+    std::array<Row, tap_count> a;
+    Row b;
+    for (size_t i = 0; i < n; ++i) {
+      for (size_t j = 0; j <= i; ++j) {
+        const auto [row, column] = std::minmax(taps[i], taps[j]);
+        a[i][j] = equations.products[row][column];
+      }
+      a[i][i] += a[i][i] * damping + equations.weight / 1024 + 1e-3;
+      b[i] = equations.targets[taps[i]];
     }
-    // Differences that hardly occur have no weight.
-    a[i][i] += a[i][i] / 4096 + equations.weight / 1024 + 1e-3;
-    b[i] = equations.targets[taps[i]];
+    if (!solve_definite(a, b, n)) continue;
+    if (round_weights(std::span(taps).first(n), b, rest, weights)) break;
   }
-  if (!solve_definite(a, b, n)) return weights;
-  int32_t left = weight_one, size = 0;
-  Weights fitted{};
-  for (size_t i = 0; i < n; ++i) {
-    if (!(std::abs(b[i]) < 8)) return weights;
-    const auto weight = static_cast<int32_t>(std::floor(b[i] * weight_one + 0.5));
-    fitted[taps[i]] = static_cast<int16_t>(weight);
-    left -= weight;
-    size += std::abs(weight);
-  }
-  if (std::abs(left) > INT16_MAX || size + std::abs(left) > most_weight) return weights;
-  fitted[static_cast<size_t>(rest)] = static_cast<int16_t>(left);
-  return fitted;
+  return weights;
 }
 
 }  // namespace voxkit::page

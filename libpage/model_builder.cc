@@ -35,8 +35,8 @@ struct Sampled {
   Extent extent;
   std::vector<uint32_t> values;
   std::vector<uint32_t> decoded;
-  Parent<uint32_t> parent{};          ///< samples
-  std::vector<uint32_t> parents{};    ///< as numbers
+  Parent<uint32_t> parent{};        ///< samples
+  std::vector<uint32_t> parents{};  ///< as numbers
 };
 
 bool is_constant(const ModelData& model, const Sampled& page) {
@@ -163,7 +163,8 @@ Parent<uint32_t> parent_of(const ModelBuilder::Page& page) {
 Result<size_t> size_with(const Model& model, std::span<const ModelBuilder::Page> pages) {
   std::vector<std::byte> bytes = model.serialise();
   for (const ModelBuilder::Page& page : pages)
-    VOX_CHECK(encode_page(model, std::span<const uint32_t>(page.samples), page.extent, bytes, parent_of(page)));
+    VOX_CHECK(
+        encode_page(model, std::span<const uint32_t>(page.samples), page.extent, bytes, parent_of(page)));
   return bytes.size();
 }
 

@@ -87,22 +87,25 @@ class ModelBuilder {
 };
 
 /// Appends the bytes of a page to `out`: none where all samples are within the bound of the background. They
-/// depend on nothing but the model, the samples and, where the model has parents, `parent`. `decoded`, if it is
-/// not empty, receives what the decoder will have. Errors: ErrorCode::usage for samples that the model cannot
-/// hold, or that are not `extent.voxels()` many, and for parents that are not those of all voxels.
+/// depend on nothing but the model, the samples and, where the model has parents, `parent`. `decoded`, if it
+/// is not empty, receives what the decoder will have. Errors: ErrorCode::usage for samples that the model
+/// cannot hold, or that are not `extent.voxels()` many, and for parents that are not those of all voxels.
 Status encode_page(const Model& model, std::span<const uint8_t> samples, Extent extent,
-                   std::vector<std::byte>& out, const Parent<uint8_t>& parent = {}, std::span<uint8_t> decoded = {});
+                   std::vector<std::byte>& out, const Parent<uint8_t>& parent = {},
+                   std::span<uint8_t> decoded = {});
 Status encode_page(const Model& model, std::span<const uint16_t> samples, Extent extent,
-                   std::vector<std::byte>& out, const Parent<uint16_t>& parent = {}, std::span<uint16_t> decoded = {});
+                   std::vector<std::byte>& out, const Parent<uint16_t>& parent = {},
+                   std::span<uint16_t> decoded = {});
 Status encode_page(const Model& model, std::span<const uint32_t> samples, Extent extent,
-                   std::vector<std::byte>& out, const Parent<uint32_t>& parent = {}, std::span<uint32_t> decoded = {});
+                   std::vector<std::byte>& out, const Parent<uint32_t>& parent = {},
+                   std::span<uint32_t> decoded = {});
 
 /// Decodes a page of exactly these bytes into `extent.voxels()` samples. Safe on any bytes: it touches
 /// nothing else, and damage that shows is ErrorCode::input; what was written by then is undefined.
 /// ErrorCode::usage where the type is too narrow for the model, `out` is not of that size, or `parent` is not
 /// as when it was encoded; other samples of it than then are as good as damage to the page.
-Status decode_page(const Model& model, std::span<const std::byte> page, Extent extent,
-                   std::span<uint8_t> out, const Parent<uint8_t>& parent = {});
+Status decode_page(const Model& model, std::span<const std::byte> page, Extent extent, std::span<uint8_t> out,
+                   const Parent<uint8_t>& parent = {});
 Status decode_page(const Model& model, std::span<const std::byte> page, Extent extent,
                    std::span<uint16_t> out, const Parent<uint16_t>& parent = {});
 Status decode_page(const Model& model, std::span<const std::byte> page, Extent extent,

@@ -115,8 +115,8 @@ template <class Width>
   if (z == 0) behind = above;
   for (int x = 0; x < max_side; ++x) {
     const auto at = static_cast<size_t>(x);
-    const int activity = 2 * (above[x] + behind[x]) + above[x - 1] + above[x + 1] + behind[x - 1] +
-                         behind[x + 1] + share[at];
+    const int activity =
+        2 * (above[x] + behind[x]) + above[x - 1] + above[x + 1] + behind[x - 1] + behind[x + 1] + share[at];
     plan.activity[at] = static_cast<uint16_t>(std::min(activity, most_row_activity));
   }
   plan.activity[0] = static_cast<uint16_t>(
@@ -157,8 +157,8 @@ template <class Width>
   find_ranges<Width>(rows, ranges);
   std::array<uint16_t, max_side> share;
   for (size_t x = 0; x < max_side; ++x)
-    share[x] = static_cast<uint16_t>(
-        Width::range_share(ranges.least[x], ranges.greatest[x], model.half_steps));
+    share[x] =
+        static_cast<uint16_t>(Width::range_share(ranges.least[x], ranges.greatest[x], model.half_steps));
   find_activity(y, z, memory, share, plan);
 }
 
@@ -173,11 +173,11 @@ template <class Width>
   const RowWeights& weights = model.rows[row_class];
   // Each tap's row, from where its weight for voxel 0 applies.
   const std::array<const Stored*, tap_count - 2> taps = {
-      rows[0] - 1,    rows[0],    rows[0] + 1, rows[1] - 1, rows[1],        rows[1] + 1,    rows[2] - 1,
-      rows[2],        rows[2] + 1, rows[3] - 1, rows[3],    rows[3] + 1,    rows[4],        rows[5],
-      parents[0] - 2, parents[0], parents[0] + 2, parents[1] - 2, parents[1], parents[1] + 2,
-      parents[2] - 2, parents[2], parents[2] + 2, parents[3] - 2, parents[3], parents[3] + 2,
-      parents[4], parents[5]};
+      rows[0] - 1, rows[0],        rows[0] + 1,    rows[1] - 1, rows[1],        rows[1] + 1,
+      rows[2] - 1, rows[2],        rows[2] + 1,    rows[3] - 1, rows[3],        rows[3] + 1,
+      rows[4],     rows[5],        parents[0] - 2, parents[0],  parents[0] + 2, parents[1] - 2,
+      parents[1],  parents[1] + 2, parents[2] - 2, parents[2],  parents[2] + 2, parents[3] - 2,
+      parents[3],  parents[3] + 2, parents[4],     parents[5]};
   const auto number = [](size_t i) { return i < left_tap ? i : i + 2; };
   for (size_t x = 0; x < max_side; ++x) {
     Sum sum = rounding;

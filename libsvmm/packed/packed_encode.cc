@@ -110,7 +110,9 @@ std::vector<std::pair<uint64_t, uint64_t>> runs_of(const PageGrid& grid, uint64_
 class DecodedLevel {
  public:
   DecodedLevel(int level, const PageGrid& grid, int code_bytes)
-      : level_(level), grid_(grid), stride_(static_cast<size_t>(grid.side * grid.side * grid.side * code_bytes)) {}
+      : level_(level),
+        grid_(grid),
+        stride_(static_cast<size_t>(grid.side * grid.side * grid.side * code_bytes)) {}
   int level() const { return level_; }
   size_t page_bytes() const { return stride_; }
   /// Pages in order, each of `page_bytes()`.
@@ -251,8 +253,8 @@ class Encoder {
     VOX_CHECK(PageReader(source(level + 1), above, params_, raster(level + 1))
                   .read(parent_number, parent_number + 1, [&](uint64_t, auto codes, page::Extent) -> Status {
                     for (const auto code : codes)
-                      room.push_back(static_cast<T>(std::min<uint64_t>(
-                          (code + bound) / step * step, std::numeric_limits<T>::max())));
+                      room.push_back(static_cast<T>(
+                          std::min<uint64_t>((code + bound) / step * step, std::numeric_limits<T>::max())));
                     return {};
                   }));
     page::Parent<T> parent = placed<T>(child, above);
@@ -262,8 +264,9 @@ class Encoder {
 
   Result<page::Model> fit(int level) {
     page::ModelBuilder builder;
-    VOX_TRY(const Reservation memory, Reservation::take(most_samples * page::max_voxels * sizeof(uint32_t),
-                                                        "pages to fit a model to", ctx_));
+    VOX_TRY(const Reservation memory,
+            Reservation::take(2 * most_samples * page::max_voxels * sizeof(uint32_t),
+                              "pages to fit a model to", ctx_));
     page::ModelOptions options;
     options.parents = level + 1 < params_.levels;
     VOX_CHECK(sample_pages(level, [&](uint64_t number, auto codes, page::Extent extent) -> Status {

@@ -120,8 +120,7 @@ Result<std::shared_ptr<const PackedVolume>> PackedVolume::open(std::shared_ptr<c
     const ChunkEntry& entry = table[i];
     if (entry.kind != pages_kind && entry.kind != model_kind) continue;
     size_t* slot = nullptr;
-    if (entry.kind == model_kind && entry.part == 0 &&
-        entry.index < static_cast<uint32_t>(levels))
+    if (entry.kind == model_kind && entry.part == 0 && entry.index < static_cast<uint32_t>(levels))
       slot = &models[entry.index];
     if (entry.kind == pages_kind && entry.index < static_cast<uint32_t>(levels) &&
         entry.part < pages.levels[entry.index].chunks.size())
@@ -238,8 +237,10 @@ Status decode_box(const Container& container, const PackedVolume& volume, const 
     const page::Extent extent = grid.extent(number);
     numbers[waiting] = number;
     jobs[waiting] = {
-        bytes, extent,
-        std::span(buffer).subspan(waiting * page::max_voxels, static_cast<size_t>(extent.voxels())), {}};
+        bytes,
+        extent,
+        std::span(buffer).subspan(waiting * page::max_voxels, static_cast<size_t>(extent.voxels())),
+        {}};
     if (l.model->has_parents()) {
       VOX_TRY(jobs[waiting].parent, parent_of<T>(container, pages, level, number, ancestors));
     }
@@ -274,8 +275,8 @@ Status PackedVolume::decode(const Box& box, int level, VoxelSpan out) const {
 }
 
 template <class T>
-Result<Voxel> sample_of(const Container& container, const PackedVolume& volume, const auto& pages, Index3 voxel,
-                        int level) {
+Result<Voxel> sample_of(const Container& container, const PackedVolume& volume, const auto& pages,
+                        Index3 voxel, int level) {
   const PageGrid& grid = pages.levels[static_cast<size_t>(level)].grid;
   const uint64_t number = grid.number(voxel / grid.side);
   Ancestors ancestors;

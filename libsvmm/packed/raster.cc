@@ -24,7 +24,8 @@ Raster::Raster(std::span<const uint32_t> values) {
   size_t at = 0;
   for (uint32_t value = 0; value < nearest_.size(); ++value) {
     while (at + 1 < values_.size() && values_[at + 1] <= value) ++at;
-    const bool above = at + 1 < values_.size() && value > values_[at] && values_[at + 1] - value < value - values_[at];
+    const bool above =
+        at + 1 < values_.size() && value > values_[at] && values_[at + 1] - value < value - values_[at];
     nearest_[value] = static_cast<uint16_t>(values_[at + (above ? 1 : 0)]);
   }
 }

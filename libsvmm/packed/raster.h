@@ -7,9 +7,9 @@
 
 namespace voxkit::svmm {
 
-/// Of a volume whose values keep a distance of each other, as those of measurements of few bits do, means need
-/// be no finer: what they are rounded to. A mean moves by at most about half the least distance of two values,
-/// and at most a 64th of their range.
+/// Of a volume whose values keep a distance of each other, as those of measurements of few bits do, means
+/// need be no finer: what they are rounded to. A mean moves by at most about half the least distance of two
+/// values, and at most a 64th of their range.
 class Raster {
  public:
   /// Everything stays as it is.
