@@ -10,8 +10,11 @@ namespace voxkit::page {
 /// Magnitudes of residuals are remembered up to this.
 inline constexpr uint32_t most_magnitude = 255;
 inline constexpr int activity_steps = 24;
-/// In the first plane; in the first row of others; in other rows.
-inline constexpr int context_count = 3 * activity_steps;
+/// In the first plane; in the first row of others; in other rows. With parents: of each of the 8 children.
+inline constexpr int context_count(bool parents) {
+  return (parents ? 8 : 3) * activity_steps;
+}
+inline constexpr int most_contexts = context_count(true);
 /// The least activity of each step from the second on.
 inline constexpr std::array<uint16_t, activity_steps - 1> thresholds = {
     1, 2, 3, 4, 5, 6, 7, 8, 11, 15, 20, 27, 37, 49, 67, 90, 122, 164, 222, 299, 404, 546, 737};

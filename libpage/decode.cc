@@ -8,11 +8,6 @@
 namespace voxkit::page {
 namespace {
 
-template <class T>
-T sample_of(const ModelData& model, uint32_t value) {
-  return static_cast<T>(model.palette.empty() ? value : model.palette[value]);
-}
-
 /// Pages of one extent, all of them with residuals.
 template <class Width, int lane_count, class T>
 [[gnu::always_inline]] inline void decode_group_body(const ModelData& model, const PageJob<T>* const* jobs,
@@ -22,6 +17,7 @@ template <class Width, int lane_count, class T>
   for (size_t n = 0; n < lane_count; ++n) {
     lanes[n].coder.open(jobs[n]->page);
     out[n] = jobs[n]->out.data();
+    if (model.classes.parents) load_parents(model, jobs[n]->parent, jobs[n]->extent, lanes[n].memory);
   }
   const Extent extent = jobs[0]->extent;
   const uint32_t* const palette = model.palette.empty() ? nullptr : model.palette.data();
@@ -61,6 +57,9 @@ template <class T>
 Status usable(const Model& model, const PageJob<T>& job) {
   if (!job.extent.valid() || job.out.size() != static_cast<size_t>(job.extent.voxels()))
     return bad_usage("a page decoded into another number of samples than its extent: expected room for all");
+  if (model.has_parents() && !covers(job.parent, job.extent))
+    return bad_usage(
+        "a page decoded without the parents of all its voxels: expected those that its model has");
   if (model.max_sample() > std::numeric_limits<T>::max())
     return bad_usage("a page decoded into samples of too few bits: expected those of its model");
   return {};
@@ -132,24 +131,25 @@ Status decode_all(const Model& shared, std::span<const PageJob<T>> jobs, size_t*
 }
 
 template <class T>
-Status decode_one(const Model& model, std::span<const std::byte> page, Extent extent, std::span<T> out) {
-  const PageJob<T> job{page, extent, out};
+Status decode_one(const Model& model, std::span<const std::byte> page, Extent extent, std::span<T> out,
+                  const Parent<T>& parent) {
+  const PageJob<T> job{page, extent, out, parent};
   return decode_all<T>(model, std::span<const PageJob<T>>(&job, 1), nullptr);
 }
 
 }  // namespace
 
-Status decode_page(const Model& model, std::span<const std::byte> page, Extent extent,
-                   std::span<uint8_t> out) {
-  return decode_one(model, page, extent, out);
+Status decode_page(const Model& model, std::span<const std::byte> page, Extent extent, std::span<uint8_t> out,
+                   const Parent<uint8_t>& parent) {
+  return decode_one(model, page, extent, out, parent);
 }
 Status decode_page(const Model& model, std::span<const std::byte> page, Extent extent,
-                   std::span<uint16_t> out) {
-  return decode_one(model, page, extent, out);
+                   std::span<uint16_t> out, const Parent<uint16_t>& parent) {
+  return decode_one(model, page, extent, out, parent);
 }
 Status decode_page(const Model& model, std::span<const std::byte> page, Extent extent,
-                   std::span<uint32_t> out) {
-  return decode_one(model, page, extent, out);
+                   std::span<uint32_t> out, const Parent<uint32_t>& parent) {
+  return decode_one(model, page, extent, out, parent);
 }
 Status decode_pages(const Model& model, std::span<const PageJob<uint8_t>> jobs, size_t* failed) {
   return decode_all(model, jobs, failed);

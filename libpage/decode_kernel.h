@@ -49,6 +49,7 @@ template <class Width, int lane_count, class RowOut>
   constexpr int64_t lowest = -int64_t{Width::offset};
   const int64_t highest = int64_t{model.max_value} - Width::offset;
   const uint64_t step = model.step();
+  const size_t next_child = model.classes.parents ? activity_steps * sizeof(DecodingTable) : 0;
   [[maybe_unused]] const bool wraps = model.max_error == 0;
   // Numbers of lanes are constants, so that what is of a lane can be in registers.
   const auto each = [](const auto& body) __attribute__((always_inline)) {
@@ -75,7 +76,7 @@ template <class Width, int lane_count, class RowOut>
       const auto voxel = [&](size_t n, size_t x) __attribute__((always_inline)) {
         const RowPlan<Width>& plan = lanes[n].plan;
         const auto* table = reinterpret_cast<const DecodingTable*>(
-            table_bytes[n] +
+            table_bytes[n] + (next_child & (0 - (x & 1))) +
             size_t{8} * step_of_activity<sizeof(DecodingTable) / 8>[activity_at(plan, x, left[n])]);
         const uint32_t folded = decode_folded<Width>(coder[n], *table);
         const int64_t mean = predict(plan, x, left[n]);

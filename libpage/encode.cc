@@ -30,10 +30,16 @@ void write_residuals(const ModelData& model, const Residuals& residuals, std::ve
 }
 
 template <class T>
-Status encode(const Model& shared, std::span<const T> samples, Extent extent, std::vector<std::byte>& out) {
+Status encode(const Model& shared, std::span<const T> samples, Extent extent, std::vector<std::byte>& out,
+              const Parent<T>& parent, std::span<T> decoded) {
   const ModelData& model = shared.data();
   if (!extent.valid() || samples.size() != static_cast<size_t>(extent.voxels()))
     return bad_usage("a page of another number of samples than its extent: expected them all");
+  if (model.classes.parents && !covers(parent, extent))
+    return bad_usage("a page without the parents of all its voxels: expected those that its model has");
+  const auto tell = [&](auto value_at) {
+    for (size_t i = 0; i < decoded.size(); ++i) decoded[i] = sample_of<T>(model, value_at(i));
+  };
   std::array<uint32_t, max_voxels> values;
   if (model.palette.empty()) {
     std::ranges::copy(samples, values.begin());
@@ -52,40 +58,44 @@ Status encode(const Model& shared, std::span<const T> samples, Extent extent, st
   if (greatest > model.max_value)
     return bad_usage("a sample above the greatest of the model: expected max_sample to be that of all pages");
   if (greatest - least <= 2 * uint64_t{model.max_error}) {
-    const auto covers = [&](uint32_t value) {
+    const auto near = [&](uint32_t value) {
       return int64_t{greatest} - int64_t{value} <= int64_t{model.max_error} &&
              int64_t{value} - int64_t{least} <= int64_t{model.max_error};
     };
-    if (covers(model.background)) return {};
-    const uint32_t middle = least + (greatest - least) / 2;
+    const bool empty = near(model.background);
+    const uint32_t middle = empty ? model.background : least + (greatest - least) / 2;
+    tell([&](size_t) { return middle; });
+    if (empty) return {};
     for (size_t byte = 0; byte < model.value_bytes(); ++byte)
       out.push_back(static_cast<std::byte>(middle >> 8 * byte & 0xff));
     return {};
   }
   Residuals residuals;
+  std::array<uint32_t, max_voxels> lossy;
   if (model.wide()) {
-    find_residuals<Wide>(model, page, extent, residuals);
+    find_residuals<Wide>(model, page, extent, parent, residuals, lossy.data());
     write_residuals<Wide>(model, residuals, out);
   } else {
-    find_residuals<Narrow>(model, page, extent, residuals);
+    find_residuals<Narrow>(model, page, extent, parent, residuals, lossy.data());
     write_residuals<Narrow>(model, residuals, out);
   }
+  tell([&](size_t i) { return lossy[i]; });
   return {};
 }
 
 }  // namespace
 
 Status encode_page(const Model& model, std::span<const uint8_t> samples, Extent extent,
-                   std::vector<std::byte>& out) {
-  return encode(model, samples, extent, out);
+                   std::vector<std::byte>& out, const Parent<uint8_t>& parent, std::span<uint8_t> decoded) {
+  return encode(model, samples, extent, out, parent, decoded);
 }
 Status encode_page(const Model& model, std::span<const uint16_t> samples, Extent extent,
-                   std::vector<std::byte>& out) {
-  return encode(model, samples, extent, out);
+                   std::vector<std::byte>& out, const Parent<uint16_t>& parent, std::span<uint16_t> decoded) {
+  return encode(model, samples, extent, out, parent, decoded);
 }
 Status encode_page(const Model& model, std::span<const uint32_t> samples, Extent extent,
-                   std::vector<std::byte>& out) {
-  return encode(model, samples, extent, out);
+                   std::vector<std::byte>& out, const Parent<uint32_t>& parent, std::span<uint32_t> decoded) {
+  return encode(model, samples, extent, out, parent, decoded);
 }
 
 }  // namespace voxkit::page

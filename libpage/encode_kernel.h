@@ -17,10 +17,11 @@ struct Residuals {
 };
 
 /// Quantises in closed loop: what is predicted from is what the decoder will have. Where `decoded` is given,
-/// it receives that. Samples are at most `model.max_value`.
-template <class Width>
-void find_residuals(const ModelData& model, std::span<const uint32_t> samples, Extent extent, Residuals& out,
-                    uint32_t* decoded = nullptr) {
+/// it receives that. Samples are at most `model.max_value`; those of `parent` are, if the model has a
+/// palette, not numbers of its entries.
+template <class Width, class T>
+void find_residuals(const ModelData& model, std::span<const uint32_t> samples, Extent extent,
+                    const Parent<T>& parent, Residuals& out, uint32_t* decoded = nullptr) {
   using Stored = typename Width::Stored;
   constexpr int64_t lowest = -int64_t{Width::offset};
   const int64_t highest = int64_t{model.max_value} - Width::offset;
@@ -28,6 +29,8 @@ void find_residuals(const ModelData& model, std::span<const uint32_t> samples, E
   const auto bound = static_cast<int64_t>(model.max_error);
   Memory<Width> memory;
   RowPlan<Width> plan;
+  const uint32_t next_child = model.classes.parents ? activity_steps : 0;
+  if (model.classes.parents) load_parents(model, parent, extent, memory);
   size_t at = 0;
   for (int z = 0; z < extent.nz; ++z)
     for (int y = 0; y < extent.ny; ++y) {
@@ -36,8 +39,8 @@ void find_residuals(const ModelData& model, std::span<const uint32_t> samples, E
       uint16_t* magnitudes = row_of(memory.magnitudes, y, z);
       Left<Width> left;
       for (size_t x = 0; x < static_cast<size_t>(extent.nx); ++x, ++at) {
-        out.context[at] =
-            static_cast<uint8_t>(plan.context + step_of_activity<1>[activity_at(plan, x, left)]);
+        out.context[at] = static_cast<uint8_t>(plan.context + (x % 2 != 0 ? next_child : 0) +
+                                               step_of_activity<1>[activity_at(plan, x, left)]);
         const int64_t mean = predict(plan, x, left);
         const int64_t predicted = std::clamp(mean >> weight_bits, lowest, highest);
         const int64_t value = int64_t{samples[at]} - Width::offset;

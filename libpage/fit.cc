@@ -4,6 +4,8 @@
 #include <bit>
 #include <cmath>
 
+#include "libpage/parent_rows.h"
+
 namespace voxkit::page {
 namespace {
 
@@ -34,27 +36,49 @@ bool solve_definite(std::array<std::array<double, tap_count>, tap_count>& a, std
   return true;
 }
 
+/// From fractions of one, with what they leave as that of the rest tap. False, and nothing changed, where
+/// they are larger than a model can hold.
+bool round_weights(std::span<const size_t> taps, const std::array<double, tap_count>& fractions, int rest,
+                   Weights& out) {
+  int32_t left = weight_one, size = 0;
+  Weights fitted{};
+  for (size_t i = 0; i < taps.size(); ++i) {
+    if (!(std::abs(fractions[i]) < 7)) return false;
+    const auto weight = static_cast<int32_t>(std::floor(fractions[i] * weight_one + 0.5));
+    fitted[taps[i]] = static_cast<int16_t>(weight);
+    left -= weight;
+    size += std::abs(weight);
+  }
+  if (std::abs(left) > INT16_MAX || size + std::abs(left) > most_weight) return false;
+  fitted[static_cast<size_t>(rest)] = static_cast<int16_t>(left);
+  out = fitted;
+  return true;
+}
+
 }  // namespace
 
-Fit::Fit(uint32_t greatest, uint32_t max_error)
-    // Weights need no more than 20 bits of a sample.
-    : shift_(std::max(0, static_cast<int>(std::bit_width(greatest)) - 20)), equations_(class_count) {
+Fit::Fit(Classes classes, uint32_t greatest, uint32_t max_error)
+    : classes_(classes),
+      // Weights need no more than 20 bits of a sample.
+      shift_(std::max(0, static_cast<int>(std::bit_width(greatest)) - 20)),
+      equations_(static_cast<size_t>(classes.count())) {
   const double error = static_cast<double>(max_error >> shift_);
   quiet_ = 16 * (16 + error * error);
 }
 
 void Fit::add(std::span<const FitPage> pages, double noise) {
   for (int i = 0; i < shift_; ++i) noise /= 4;
-  std::vector<Equations> sums(class_count);
+  std::vector<Equations> sums(equations_.size());
   for (const FitPage& page : pages) add_page(page, sums);
-  for (size_t c = 0; c < class_count; ++c) {
+  for (size_t c = 0; c < sums.size(); ++c) {
     Equations& total = equations_[c];
+    const double own = noise * sums[c].weight;
     // Of two taps' differences from a third, the noise is twice that of one, and once in common.
-    const double common = noise * sums[c].weight;
+    const double common = classes_.parents ? 0 : own;
     for (size_t i = 0; i < tap_count; ++i) {
       for (size_t j = i; j < tap_count; ++j)
         total.products[i][j] =
-            total.products[i][j] / 2 + sums[c].products[i][j] + common + (i == j ? common : 0);
+            total.products[i][j] / 2 + sums[c].products[i][j] + common + (i == j && i < parent_tap ? own : 0);
       total.targets[i] = total.targets[i] / 2 + sums[c].targets[i] + common;
     }
     total.weight = total.weight / 2 + sums[c].weight;
@@ -67,12 +91,19 @@ void Fit::add_page(const FitPage& page, std::vector<Equations>& all) const {
     const int cx = std::clamp(x, 0, e.nx - 1), cy = std::clamp(y, 0, e.ny - 1), cz = std::max(z, 0);
     return static_cast<double>(page.decoded[static_cast<size_t>((cz * e.ny + cy) * e.nx + cx)] >> shift_);
   };
+  const auto parent = [&](int x, int y, int z) {
+    const Parent<uint32_t>& p = page.parent;
+    const int cx = std::clamp(p.x + x, 0, p.extent.nx - 1), cy = std::clamp(p.y + y, 0, p.extent.ny - 1),
+              cz = std::clamp(p.z + z, 0, p.extent.nz - 1);
+    return static_cast<double>(p.samples[static_cast<size_t>((cz * p.extent.ny + cy) * p.extent.nx + cx)] >>
+                               shift_);
+  };
   size_t at = 0;
   for (int z = 0; z < e.nz; ++z)
     for (int y = 0; y < e.ny; ++y)
       for (int x = 0; x < e.nx; ++x, ++at) {
-        const int voxel_class = class_of(place(x, e.nx), place(y, e.ny), z > 0);
-        const int rest = rest_tap(voxel_class);
+        const int voxel_class = classes_.of(classes_.along(x, e.nx), classes_.along(y, e.ny), z);
+        const int rest = classes_.rest(voxel_class);
         if (rest < 0) continue;
         Row taps{};
         for (int dy = -1; dy <= 1; ++dy)
@@ -83,11 +114,23 @@ void Fit::add_page(const FitPage& page, std::vector<Equations>& all) const {
         taps[second_left_tap] = decoded(x - 2, y, z);
         taps[second_above_tap] = decoded(x, y - 2, z);
         taps[second_behind_tap] = decoded(x, y, z - 2);
+        if (classes_.parents) {
+          const int px = x / 2, py = y / 2, pz = z / 2, dy = toward(y), dz = toward(z);
+          for (int dx = -1; dx <= 1; ++dx) {
+            const auto at_dx = static_cast<size_t>(parent_tap + 1 + dx);
+            taps[at_dx] = parent(px + dx, py, pz);
+            taps[at_dx + 3] = parent(px + dx, py + dy, pz);
+            taps[at_dx + 6] = parent(px + dx, py, pz + dz);
+            taps[at_dx + 9] = parent(px + dx, py + dy, pz + dz);
+          }
+          taps[parent_tap + 12] = parent(px, py - dy, pz);
+          taps[parent_tap + 13] = parent(px, py, pz - dz);
+        }
         const double origin = taps[static_cast<size_t>(rest)];
         double least = 0, greatest = 0;
         for (int t = 0; t < tap_count; ++t) {
           double& tap = taps[static_cast<size_t>(t)];
-          tap = has_tap(voxel_class, t) ? tap - origin : 0;
+          tap = classes_.has(voxel_class, t) ? tap - origin : 0;
           least = std::min(least, tap);
           greatest = std::max(greatest, tap);
         }
@@ -96,56 +139,50 @@ void Fit::add_page(const FitPage& page, std::vector<Equations>& all) const {
         Equations& sums = all[static_cast<size_t>(voxel_class)];
         sums.weight += weight;
         if (range == 0) continue;
-        for (size_t i = 0; i < tap_count; ++i) {
+        const auto count = static_cast<size_t>(taps_of(classes_.parents));
+        for (size_t i = 0; i < count; ++i) {
           const double weighted = weight * taps[i];
           sums.targets[i] += weighted * target;
-          for (size_t j = i; j < tap_count; ++j) sums.products[i][j] += weighted * taps[j];
+          for (size_t j = i; j < count; ++j) sums.products[i][j] += weighted * taps[j];
         }
       }
 }
 
-std::array<Weights, class_count> Fit::weights() const {
-  std::array<Weights, class_count> weights{};
-  for (int c = 0; c < class_count; ++c)
+std::array<Weights, most_classes> Fit::weights() const {
+  std::array<Weights, most_classes> weights{};
+  for (int c = 0; c < classes_.count(); ++c)
     weights[static_cast<size_t>(c)] = solve(equations_[static_cast<size_t>(c)], c);
   return weights;
 }
 
-Weights Fit::solve(const Equations& equations, int voxel_class) {
+Weights Fit::solve(const Equations& equations, int voxel_class) const {
   Weights weights{};
-  const int rest = rest_tap(voxel_class);
+  const int rest = classes_.rest(voxel_class);
   if (rest < 0) return weights;
   weights[static_cast<size_t>(rest)] = weight_one;
   std::array<size_t, tap_count> taps;
   size_t n = 0;
   for (int t = 0; t < tap_count; ++t)
-    if (t != rest && has_tap(voxel_class, t)) taps[n++] = static_cast<size_t>(t);
+    if (t != rest && classes_.has(voxel_class, t)) taps[n++] = static_cast<size_t>(t);
   if (n == 0 || equations.weight == 0) return weights;
 
-  std::array<Row, tap_count> a;
-  Row b;
-  for (size_t i = 0; i < n; ++i) {
-    for (size_t j = 0; j <= i; ++j) {
-      const auto [row, column] = std::minmax(taps[i], taps[j]);
-      a[i][j] = equations.products[row][column];
+  // Differences that hardly occur have no weight. Where weights are too large for their bits, as that of the
+  // parent of noise may be, all are held back more.
+  for (double damping = 1.0 / 4096; damping < 1; damping *= 4) {
+    std::array<Row, tap_count> a;
+    Row b;
+    for (size_t i = 0; i < n; ++i) {
+      for (size_t j = 0; j <= i; ++j) {
+        const auto [row, column] = std::minmax(taps[i], taps[j]);
+        a[i][j] = equations.products[row][column];
+      }
+      a[i][i] += a[i][i] * damping + equations.weight / 1024 + 1e-3;
+      b[i] = equations.targets[taps[i]];
     }
-    // Differences that hardly occur have no weight.
-    a[i][i] += a[i][i] / 4096 + equations.weight / 1024 + 1e-3;
-    b[i] = equations.targets[taps[i]];
+    if (!solve_definite(a, b, n)) continue;
+    if (round_weights(std::span(taps).first(n), b, rest, weights)) break;
   }
-  if (!solve_definite(a, b, n)) return weights;
-  int32_t left = weight_one, size = 0;
-  Weights fitted{};
-  for (size_t i = 0; i < n; ++i) {
-    if (!(std::abs(b[i]) < 7)) return weights;
-    const auto weight = static_cast<int32_t>(std::floor(b[i] * weight_one + 0.5));
-    fitted[taps[i]] = static_cast<int16_t>(weight);
-    left -= weight;
-    size += std::abs(weight);
-  }
-  if (std::abs(left) > INT16_MAX || size + std::abs(left) > most_weight) return weights;
-  fitted[static_cast<size_t>(rest)] = static_cast<int16_t>(left);
-  return fitted;
+  return weights;
 }
 
 }  // namespace voxkit::page

@@ -7,6 +7,7 @@
 #include <vector>
 
 #include "libpage/model_data.h"
+#include "libpage/page.h"
 
 namespace voxkit::page {
 
@@ -15,6 +16,7 @@ struct FitPage {
   Extent extent;
   std::span<const uint32_t> samples;
   std::span<const uint32_t> decoded;
+  Parent<uint32_t> parent{};  ///< of models with parents
 };
 
 /// Normal equations of all classes. Sums are of doubles, in the order of pages and voxels: nothing else
@@ -22,13 +24,13 @@ struct FitPage {
 class Fit {
  public:
   /// Samples are at most `greatest`; the quantiser's bound is `max_error`.
-  Fit(uint32_t greatest, uint32_t max_error);
+  Fit(Classes classes, uint32_t greatest, uint32_t max_error);
   /// One equation for each voxel; it counts the less, the further apart its taps are. What was added before
   /// counts half. `noise` is the variance that the quantiser will add to what is given as decoded (Wiener):
-  /// 0 where that has it already.
+  /// 0 where that has it already. Parents have it already in any case.
   void add(std::span<const FitPage> pages, double noise);
   /// The weights of least squared error for each class.
-  std::array<Weights, class_count> weights() const;
+  std::array<Weights, most_classes> weights() const;
 
  private:
   using Row = std::array<double, tap_count>;
@@ -39,8 +41,9 @@ class Fit {
     double weight = 0;
   };
   void add_page(const FitPage& page, std::vector<Equations>& sums) const;
-  static Weights solve(const Equations& equations, int voxel_class);
+  Weights solve(const Equations& equations, int voxel_class) const;
 
+  Classes classes_;
   int shift_;     ///< of samples
   double quiet_;  ///< the squared range of taps at which an equation counts half
   std::vector<Equations> equations_;

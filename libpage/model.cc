@@ -8,26 +8,27 @@
 namespace voxkit::page {
 namespace {
 
-constexpr uint32_t format_version = 1;
+/// Of models without and with parents.
+constexpr uint32_t version_alone = 1, version_with_parents = 2;
 constexpr int weight_golomb = 7, palette_golomb = 2;
 
 tl::unexpected<Error> wrong(const char* what) {
   return bad_input({}, std::string("page model: ") + what);
 }
 
-void write_weights(BitWriter& out, const Weights& weights, int voxel_class) {
+void write_weights(BitWriter& out, const Weights& weights, Classes classes, int voxel_class) {
   for (int t = 0; t < tap_count; ++t)
-    if (has_tap(voxel_class, t) && t != rest_tap(voxel_class))
+    if (classes.has(voxel_class, t) && t != classes.rest(voxel_class))
       out.signed_golomb(weights[static_cast<size_t>(t)], weight_golomb);
 }
 
-bool read_weights(BitReader& in, Weights& weights, int voxel_class) {
+bool read_weights(BitReader& in, Weights& weights, Classes classes, int voxel_class) {
   weights = {};
-  const int rest = rest_tap(voxel_class);
+  const int rest = classes.rest(voxel_class);
   if (rest < 0) return true;
   int64_t left = weight_one, size = 0;
   for (int t = 0; t < tap_count; ++t) {
-    if (!has_tap(voxel_class, t) || t == rest) continue;
+    if (!classes.has(voxel_class, t) || t == rest) continue;
     const int32_t weight = in.signed_golomb(weight_golomb);
     if (weight > INT16_MAX || weight < -INT16_MAX) return false;
     weights[static_cast<size_t>(t)] = static_cast<int16_t>(weight);
@@ -43,17 +44,37 @@ bool read_weights(BitReader& in, Weights& weights, int voxel_class) {
 
 void ModelData::derive() {
   half_steps = static_cast<uint32_t>((uint64_t{1} << 15) / step());
-  decoding.resize(context_count);
-  for (size_t c = 0; c < context_count; ++c) {
+  decoding.resize(static_cast<size_t>(contexts()));
+  for (size_t c = 0; c < decoding.size(); ++c) {
     starts[c] = page::starts(tables[c]);
     fill_decoding_table(tables[c], wide() ? Wide::escape_bits : Narrow::escape_bits, decoding[c]);
   }
+  set_weights(weights);
+}
+
+void ModelData::set_weights(const std::array<Weights, most_classes>& fitted) {
+  weights = fitted;
+  if (!classes.parents) return;
+  for (size_t row = 0; row < rows.size(); ++row)
+    for (size_t t = 0; t < tap_count; ++t)
+      for (size_t x = 0; x < max_side; ++x)
+        rows[row][t][x] =
+            weights[4 * row + static_cast<size_t>(classes.along(static_cast<int>(x), max_side))][t];
+}
+
+uint32_t ModelData::nearest(uint32_t sample) const {
+  if (palette.empty()) return std::min(sample, max_value);
+  const auto at = std::ranges::lower_bound(palette, sample);
+  const auto number = static_cast<uint32_t>(at - palette.begin());
+  if (at == palette.begin()) return 0;
+  if (at == palette.end()) return number - 1;
+  return sample - *(at - 1) <= *at - sample ? number - 1 : number;
 }
 
 std::vector<std::byte> Model::serialise() const {
   const ModelData& m = *data_;
   BitWriter out;
-  out.put(format_version, 8);
+  out.put(m.classes.parents ? version_with_parents : version_alone, 8);
   out.put(m.palette.empty() ? 0 : 1, 1);
   out.put(m.max_value, 32);
   out.golomb(m.max_error, 0);
@@ -63,9 +84,10 @@ std::vector<std::byte> Model::serialise() const {
     out.golomb(m.palette[i] - before, palette_golomb);
     before = m.palette[i] + 1;
   }
-  for (int c = 0; c < class_count; ++c) write_weights(out, m.weights[static_cast<size_t>(c)], c);
+  for (int c = 0; c < m.classes.count(); ++c)
+    write_weights(out, m.weights[static_cast<size_t>(c)], m.classes, c);
   const Frequencies* previous = nullptr;
-  for (const Frequencies& table : m.tables) {
+  for (const Frequencies& table : std::span(m.tables).first(static_cast<size_t>(m.contexts()))) {
     const bool same = previous && table == *previous;
     out.put(same ? 1 : 0, 1);
     if (!same) write_frequencies(out, table);
@@ -76,10 +98,13 @@ std::vector<std::byte> Model::serialise() const {
 
 Result<Model> Model::parse(std::span<const std::byte> bytes) {
   BitReader in(bytes);
-  if (in.get(8) != format_version) return wrong("unknown version: expected 1");
+  const uint32_t version = in.get(8);
+  if (version != version_alone && version != version_with_parents)
+    return wrong("unknown version: expected 1 or 2");
   auto made = std::make_shared<ModelData>();
   ModelData& m = *made;
   const bool has_palette = in.get(1) != 0;
+  m.classes.parents = version == version_with_parents;
   m.max_value = in.get(32);
   m.max_error = in.golomb(0);
   m.background = in.golomb(8);
@@ -97,10 +122,10 @@ Result<Model> Model::parse(std::span<const std::byte> bytes) {
       next = value + 1;
     }
   }
-  for (int c = 0; c < class_count; ++c)
-    if (!read_weights(in, m.weights[static_cast<size_t>(c)], c) || in.overrun())
+  for (int c = 0; c < m.classes.count(); ++c)
+    if (!read_weights(in, m.weights[static_cast<size_t>(c)], m.classes, c) || in.overrun())
       return wrong("weights: expected a sum of magnitudes below 16");
-  for (size_t c = 0; c < context_count; ++c) {
+  for (size_t c = 0; c < static_cast<size_t>(m.contexts()); ++c) {
     const bool same = in.get(1) != 0;
     if (same && c == 0) return wrong("tables: expected one before that is the same");
     if (same)
@@ -115,6 +140,9 @@ Result<Model> Model::parse(std::span<const std::byte> bytes) {
 
 uint32_t Model::max_error() const {
   return data_->max_error;
+}
+bool Model::has_parents() const {
+  return data_->classes.parents;
 }
 uint32_t Model::max_sample() const {
   return data_->palette.empty() ? data_->max_value : data_->palette.back();

@@ -35,6 +35,8 @@ struct Sampled {
   Extent extent;
   std::vector<uint32_t> values;
   std::vector<uint32_t> decoded;
+  Parent<uint32_t> parent{};        ///< samples
+  std::vector<uint32_t> parents{};  ///< as numbers
 };
 
 bool is_constant(const ModelData& model, const Sampled& page) {
@@ -63,14 +65,14 @@ uint32_t common_value(const ModelData& model, const std::vector<Sampled>& pages)
 
 void run(const ModelData& model, const Sampled& page, Residuals& out, uint32_t* decoded) {
   if (model.wide())
-    find_residuals<Wide>(model, page.values, page.extent, out, decoded);
+    find_residuals<Wide>(model, page.values, page.extent, page.parent, out, decoded);
   else
-    find_residuals<Narrow>(model, page.values, page.extent, out, decoded);
+    find_residuals<Narrow>(model, page.values, page.extent, page.parent, out, decoded);
 }
 
 /// Codes the pages with the weights that the model has: what their symbols are, and what is decoded.
 std::vector<Counts> count_symbols(const ModelData& model, std::vector<Sampled>& pages) {
-  std::vector<Counts> counts(context_count);
+  std::vector<Counts> counts(static_cast<size_t>(model.contexts()));
   Residuals residuals;
   for (Sampled& page : pages) {
     run(model, page, residuals, page.decoded.data());
@@ -103,53 +105,66 @@ void fit(ModelData& model, std::vector<Sampled>& pages) {
   std::vector<FitPage> sources;
   for (Sampled& page : pages) {
     page.decoded = page.values;
-    sources.push_back({page.extent, page.values, page.decoded});
+    Parent<uint32_t> parent = page.parent;
+    for (const uint32_t sample : parent.samples) page.parents.push_back(model.nearest(sample));
+    parent.samples = page.parents;
+    sources.push_back({page.extent, page.values, page.decoded, parent});
   }
   model.derive();
-  Fit equations(model.max_value, model.max_error);
+  Fit equations(model.classes, model.max_value, model.max_error);
   double noise = (4 * e * e + 4 * e) / 12;
-  std::array<Weights, class_count> best{};
+  std::array<Weights, most_classes> best{};
   std::vector<Counts> best_counts;
   const int rounds = model.max_error == 0 ? 1 : most_rounds;
   for (int round = 0; round < rounds; ++round) {
     equations.add(sources, noise);
     noise = 0;
-    model.weights = equations.weights();
+    model.set_weights(equations.weights());
     std::vector<Counts> counts = count_symbols(model, pages);
     if (round == 0 || cost(counts) < cost(best_counts)) {
       best = model.weights;
       best_counts = std::move(counts);
     }
   }
-  model.weights = best;
-  for (size_t c = 0; c < context_count; ++c) model.tables[c] = normalise(best_counts[c]);
+  model.set_weights(best);
+  for (size_t c = 0; c < best_counts.size(); ++c) model.tables[c] = normalise(best_counts[c]);
   model.derive();
 }
 
 }  // namespace
 
 template <class T>
-void ModelBuilder::keep(std::span<const T> samples, Extent extent) {
-  pages_.push_back({extent, {samples.begin(), samples.end()}});
+void ModelBuilder::keep(std::span<const T> samples, Extent extent, const Parent<T>& parent) {
+  pages_.push_back({extent,
+                    {samples.begin(), samples.end()},
+                    {parent.samples.begin(), parent.samples.end()},
+                    {{}, parent.extent, parent.x, parent.y, parent.z}});
   type_max_ = std::max<uint32_t>(type_max_, std::numeric_limits<T>::max());
 }
-void ModelBuilder::add(std::span<const uint8_t> samples, Extent extent) {
-  keep(samples, extent);
+void ModelBuilder::add(std::span<const uint8_t> samples, Extent extent, const Parent<uint8_t>& parent) {
+  keep(samples, extent, parent);
 }
-void ModelBuilder::add(std::span<const uint16_t> samples, Extent extent) {
-  keep(samples, extent);
+void ModelBuilder::add(std::span<const uint16_t> samples, Extent extent, const Parent<uint16_t>& parent) {
+  keep(samples, extent, parent);
 }
-void ModelBuilder::add(std::span<const uint32_t> samples, Extent extent) {
-  keep(samples, extent);
+void ModelBuilder::add(std::span<const uint32_t> samples, Extent extent, const Parent<uint32_t>& parent) {
+  keep(samples, extent, parent);
 }
 
 namespace {
+
+Parent<uint32_t> parent_of(const ModelBuilder::Page& page) {
+  Parent<uint32_t> parent = page.parent;
+  parent.samples = page.parents;
+  return parent;
+}
 
 /// Bytes of the model and of the pages it was made from.
 Result<size_t> size_with(const Model& model, std::span<const ModelBuilder::Page> pages) {
   std::vector<std::byte> bytes = model.serialise();
   for (const ModelBuilder::Page& page : pages)
-    VOX_CHECK(encode_page(model, std::span<const uint32_t>(page.samples), page.extent, bytes));
+    VOX_CHECK(
+        encode_page(model, std::span<const uint32_t>(page.samples), page.extent, bytes, parent_of(page)));
   return bytes.size();
 }
 
@@ -178,6 +193,8 @@ Result<Model> ModelBuilder::build(const ModelOptions& options) const {
   for (const Page& page : pages_) {
     if (!page.extent.valid() || page.samples.size() != static_cast<size_t>(page.extent.voxels()))
       return bad_usage("page model: a page of another number of samples than its extent");
+    if (options.parents && !covers(parent_of(page), page.extent))
+      return bad_usage("page model: a page without the parents of all its voxels");
     if (*std::ranges::max_element(page.samples) > max_sample)
       return bad_usage("page model: a sample above max_sample");
   }
@@ -186,9 +203,10 @@ Result<Model> ModelBuilder::build(const ModelOptions& options) const {
     made->max_error = options.max_error;
     made->max_value = palette.empty() ? max_sample : static_cast<uint32_t>(palette.size() - 1);
     made->palette = palette;
+    made->classes.parents = options.parents;
     std::vector<Sampled> pages;
     for (const Page& page : pages_) {
-      pages.push_back({page.extent, page.samples, {}});
+      pages.push_back({page.extent, page.samples, {}, parent_of(page)});
       if (!number(palette, pages.back().values))
         return bad_usage("page model: a sample that is none of the values");
     }

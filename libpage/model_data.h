@@ -18,24 +18,39 @@ inline constexpr uint32_t most_error = 0x7fffffff;
 /// Entries of a palette.
 inline constexpr size_t most_palette = 65536;
 
+/// The weight of each tap for each voxel of a row.
+using RowWeights = std::array<std::array<int16_t, max_side>, tap_count>;
+
 struct ModelData {
   uint32_t max_value = 0;         ///< of samples, or of numbers of palette entries
   uint32_t max_error = 0;         ///< E
   uint32_t background = 0;        ///< what an empty page stands for, and the prediction of the first voxel
   std::vector<uint32_t> palette;  ///< samples that numbers stand for, ascending; empty: none
-  std::array<Weights, class_count> weights{};
-  std::array<Frequencies, context_count> tables{};
+  Classes classes;                ///< whether its pages have parents
+  std::array<Weights, most_classes> weights{};
+  std::array<Frequencies, most_contexts> tables{};
 
   // From these:
   uint32_t half_steps = 0;  ///< 2^15 / step: turns a range into half its steps
-  std::array<std::array<uint16_t, symbol_count>, context_count> starts{};
+  std::array<std::array<uint16_t, symbol_count>, most_contexts> starts{};
   std::vector<DecodingTable> decoding;
+  /// With parents: weights of rows by class along y and z, of 16 voxels.
+  std::array<RowWeights, most_classes / 4> rows{};
 
+  int contexts() const { return context_count(classes.parents); }
+  /// Of parents, where there is a palette: the number of the entry next to a sample, the lower one of two.
+  uint32_t nearest(uint32_t sample) const;
   uint64_t step() const { return 2 * uint64_t{max_error} + 1; }
   bool wide() const { return max_value > 0xffff; }
   /// Bytes of a page of one value.
   size_t value_bytes() const { return max_value > 0xffff ? 4 : max_value > 0xff ? 2 : 1; }
   void derive();
+  void set_weights(const std::array<Weights, most_classes>& fitted);
 };
+
+template <class T>
+T sample_of(const ModelData& model, uint32_t value) {
+  return static_cast<T>(model.palette.empty() ? value : model.palette[value]);
+}
 
 }  // namespace voxkit::page

@@ -25,6 +25,8 @@ class Model {
   /// The bytes that `parse` takes: 1 to 4 KB as a rule.
   std::vector<std::byte> serialise() const;
 
+  /// Whether its pages can be coded and decoded only beside those of the next coarser level.
+  bool has_parents() const;
   uint32_t max_error() const;
   /// The greatest sample that a page of this model can hold.
   uint32_t max_sample() const;
@@ -38,6 +40,15 @@ class Model {
   std::shared_ptr<const ModelData> data_;
 };
 
+/// A page of the next coarser level, of which each voxel, the parent, stands for 2^3 children: what is known
+/// of a page from it. Voxel (i, j, k) of the page is a child of (x + i / 2, y + j / 2, z + k / 2) of this.
+template <class T>
+struct Parent {
+  std::span<const T> samples;  ///< as they were decoded: `extent.voxels()` of them
+  Extent extent{};
+  int x = 0, y = 0, z = 0;
+};
+
 struct ModelOptions {
   /// No decoded sample is further from its original than this; 0: all are equal. At most 2^31 - 1.
   uint32_t max_error = 0;
@@ -46,50 +57,59 @@ struct ModelOptions {
   /// All values that samples of any page have, ascending, at most 65536 of them; or empty. The model has a
   /// palette of them where that is smaller, and the bound is 0.
   std::vector<uint32_t> values;
+  /// Whether pages have parents.
+  bool parents = false;
 };
 
 /// Fits a model to sample pages, or to all of them. Its result depends on these and their order alone: all
 /// sums are integers, or of a fixed order.
 class ModelBuilder {
  public:
-  /// Keeps a copy of a page: `extent.voxels()` samples.
-  void add(std::span<const uint8_t> samples, Extent extent);
-  void add(std::span<const uint16_t> samples, Extent extent);
-  void add(std::span<const uint32_t> samples, Extent extent);
+  /// Keeps a copy of a page: `extent.voxels()` samples, and of its parents, if any.
+  void add(std::span<const uint8_t> samples, Extent extent, const Parent<uint8_t>& parent = {});
+  void add(std::span<const uint16_t> samples, Extent extent, const Parent<uint16_t>& parent = {});
+  void add(std::span<const uint32_t> samples, Extent extent, const Parent<uint32_t>& parent = {});
   /// Errors: ErrorCode::usage where options contradict each other or the samples.
   Result<Model> build(const ModelOptions& options) const;
 
   struct Page {
     Extent extent;
     std::vector<uint32_t> samples;
+    std::vector<uint32_t> parents;  ///< the whole page of parents; empty: none
+    Parent<uint32_t> parent;        ///< where it lies in these; its samples are not set
   };
 
  private:
   template <class T>
-  void keep(std::span<const T> samples, Extent extent);
+  void keep(std::span<const T> samples, Extent extent, const Parent<T>& parent);
   std::vector<Page> pages_;
   uint32_t type_max_ = 0;  ///< of the widest type of samples
 };
 
 /// Appends the bytes of a page to `out`: none where all samples are within the bound of the background. They
-/// depend on nothing but the model and the samples. Errors: ErrorCode::usage for samples that the model
-/// cannot hold, or that are not `extent.voxels()` many.
+/// depend on nothing but the model, the samples and, where the model has parents, `parent`. `decoded`, if it
+/// is not empty, receives what the decoder will have. Errors: ErrorCode::usage for samples that the model
+/// cannot hold, or that are not `extent.voxels()` many, and for parents that are not those of all voxels.
 Status encode_page(const Model& model, std::span<const uint8_t> samples, Extent extent,
-                   std::vector<std::byte>& out);
+                   std::vector<std::byte>& out, const Parent<uint8_t>& parent = {},
+                   std::span<uint8_t> decoded = {});
 Status encode_page(const Model& model, std::span<const uint16_t> samples, Extent extent,
-                   std::vector<std::byte>& out);
+                   std::vector<std::byte>& out, const Parent<uint16_t>& parent = {},
+                   std::span<uint16_t> decoded = {});
 Status encode_page(const Model& model, std::span<const uint32_t> samples, Extent extent,
-                   std::vector<std::byte>& out);
+                   std::vector<std::byte>& out, const Parent<uint32_t>& parent = {},
+                   std::span<uint32_t> decoded = {});
 
 /// Decodes a page of exactly these bytes into `extent.voxels()` samples. Safe on any bytes: it touches
 /// nothing else, and damage that shows is ErrorCode::input; what was written by then is undefined.
-/// ErrorCode::usage where the type is too narrow for the model, or `out` is not of that size.
+/// ErrorCode::usage where the type is too narrow for the model, `out` is not of that size, or `parent` is not
+/// as when it was encoded; other samples of it than then are as good as damage to the page.
+Status decode_page(const Model& model, std::span<const std::byte> page, Extent extent, std::span<uint8_t> out,
+                   const Parent<uint8_t>& parent = {});
 Status decode_page(const Model& model, std::span<const std::byte> page, Extent extent,
-                   std::span<uint8_t> out);
+                   std::span<uint16_t> out, const Parent<uint16_t>& parent = {});
 Status decode_page(const Model& model, std::span<const std::byte> page, Extent extent,
-                   std::span<uint16_t> out);
-Status decode_page(const Model& model, std::span<const std::byte> page, Extent extent,
-                   std::span<uint32_t> out);
+                   std::span<uint32_t> out, const Parent<uint32_t>& parent = {});
 
 /// One of several pages to decode.
 template <class T>
@@ -97,6 +117,7 @@ struct PageJob {
   std::span<const std::byte> page;
   Extent extent;
   std::span<T> out;
+  Parent<T> parent{};
 };
 /// As decode_page for each, several side by side, which is faster. The first damaged one in order is named by
 /// `failed`, if given; the others are decoded all the same.

@@ -1,5 +1,5 @@
-// Prediction: a weighted mean of the 16 neighbours that come before a voxel, with weights for each class of
-// voxels that have the same of these in their page.
+// Prediction: a weighted mean of the 16 neighbours that come before a voxel, and of 7 voxels of the coarser
+// level where that is known, with weights for each class of voxels that have the same of these in their page.
 #pragma once
 
 #include <algorithm>
@@ -13,8 +13,16 @@ namespace voxkit::page {
 /// 0..8: of the plane before, row y + t / 3 - 1, voxel x + t % 3 - 1; 9..11: of the row before, voxel
 /// x + t - 10; 12: the voxel before; 13, 14, 15: the second before, above and behind, or where that is
 /// outside the page, the first.
-inline constexpr int tap_count = 16;
+inline constexpr int causal_taps = 16;
 inline constexpr int left_tap = 12, second_left_tap = 13, second_above_tap = 14, second_behind_tap = 15;
+/// Of models with parents, 16: the parent, which is the voxel of the coarser level that stands for the voxel
+/// and those beside it; 17 and 18, 19 and 20, 21 and 22: the voxel before and behind that along x, y, z, or
+/// where that is outside the page of parents, the nearest inside.
+inline constexpr int parent_tap = 16;
+inline constexpr int tap_count = 30;
+inline constexpr int taps_of(bool parents) {
+  return parents ? tap_count : causal_taps;
+}
 inline constexpr int weight_bits = 12;
 /// The sum of the weights of a class, so that what is uniform is predicted as it is.
 inline constexpr int32_t weight_one = 1 << weight_bits;
@@ -26,29 +34,43 @@ enum : int { first = 0, inner = 1, last = 2 };
 constexpr int place(int at, int n) {
   return at == 0 ? first : at == n - 1 ? last : inner;
 }
-inline constexpr int class_count = 18;
-/// `place` along x and y, and whether there is a plane before.
-constexpr int class_of(int px, int py, bool behind) {
-  return (behind ? 9 : 0) + 3 * py + px;
-}
-/// Whether voxels of a class have a tap within the page.
-constexpr bool has_tap(int voxel_class, int tap) {
-  const int px = voxel_class % 3, py = voxel_class / 3 % 3;
-  const bool behind = voxel_class >= 9;
-  if (tap == left_tap || tap == second_left_tap) return px != first;
-  if (tap == second_above_tap) return py != first;
-  if (tap == second_behind_tap) return behind;
-  const int dx = tap % 3 - 1, dy = tap < 9 ? tap / 3 - 1 : -1;
-  return (behind || tap >= 9) && (dx >= 0 || px != first) && (dx <= 0 || px != last) &&
-         (dy >= 0 || py != first) && (dy <= 0 || py != last);
-}
-/// The tap whose weight is what the others leave of `weight_one`: the nearest behind, else above, else
-/// before; -1: this class has none, and is predicted as the model's background.
-constexpr int rest_tap(int voxel_class) {
-  for (const int tap : {4, 10, left_tap})
-    if (has_tap(voxel_class, tap)) return tap;
-  return -1;
-}
+/// Classes of voxels of a model, without or with parents. Which of its parent's children a voxel is matters
+/// as much as what it is next to: of the last one little is unknown.
+struct Classes {
+  bool parents = false;
+  constexpr int count() const { return parents ? 48 : 18; }
+  /// Along x or y: the first, the last, or which of two children one between them is.
+  constexpr int along(int at, int n) const {
+    if (!parents) return place(at, n);
+    return at == 0 ? 0 : at == n - 1 ? 3 : 1 + (at & 1);
+  }
+  /// Of voxels that are `px` and `py` along x and y, in plane z.
+  constexpr int of(int px, int py, int z) const {
+    if (!parents) return (z > 0 ? 9 : 0) + 3 * py + px;
+    return ((z == 0 ? 0 : 1 + (z & 1)) * 4 + py) * 4 + px;
+  }
+  /// Whether voxels of a class have a tap within the page.
+  constexpr bool has(int voxel_class, int tap) const {
+    const int sides = parents ? 4 : 3, end = sides - 1;
+    const int px = voxel_class % sides, py = voxel_class / sides % sides;
+    const bool behind = voxel_class >= sides * sides;
+    if (tap >= parent_tap) return parents;
+    if (tap == left_tap || tap == second_left_tap) return px != 0;
+    if (tap == second_above_tap) return py != 0;
+    if (tap == second_behind_tap) return behind;
+    const int dx = tap % 3 - 1, dy = tap < 9 ? tap / 3 - 1 : -1;
+    return (behind || tap >= 9) && (dx >= 0 || px != 0) && (dx <= 0 || px != end) && (dy >= 0 || py != 0) &&
+           (dy <= 0 || py != end);
+  }
+  /// The tap whose weight is what the others leave of `weight_one`: the parent, or else the nearest behind,
+  /// above, or before; -1: this class has none, and is predicted as the model's background.
+  constexpr int rest(int voxel_class) const {
+    for (const int tap : {parent_tap + 1, 4, 10, left_tap})
+      if (has(voxel_class, tap)) return tap;
+    return -1;
+  }
+};
+inline constexpr int most_classes = Classes{true}.count();
 
 using Weights = std::array<int16_t, tap_count>;
 

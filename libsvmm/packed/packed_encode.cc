@@ -4,15 +4,18 @@
 
 #include <cmath>
 #include <cstring>
+#include <limits>
 #include <numeric>
 
 #include "formats/copy.h"
+#include "formats/mapped_file.h"
 #include "formats/parallel.h"
 #include "formats/reservation.h"
 #include "formats/volume_chunks.h"
 #include "libpage/page.h"
 #include "libsvmm/packed/halve.h"
 #include "libsvmm/packed/packed_layout.h"
+#include "libsvmm/packed/raster.h"
 #include "libsvmm/packed/survey.h"
 
 namespace voxkit::svmm {
@@ -24,8 +27,9 @@ constexpr uint64_t most_samples = 512;
 /// Reads pages of a level as codes.
 class PageReader {
  public:
-  PageReader(VolumeSource& source, const PageGrid& grid, const PackedParams& params)
-      : source_(source), grid_(grid), params_(params) {}
+  /// What is read goes through `raster`.
+  PageReader(VolumeSource& source, const PageGrid& grid, const PackedParams& params, const Raster& raster)
+      : source_(source), grid_(grid), params_(params), raster_(raster) {}
 
   /// Reads the pages `first` to `last`, which are in one row, and calls take(number, codes, extent) for each.
   template <class Take>
@@ -57,6 +61,8 @@ class PageReader {
     for (int64_t z = 0; z < size.z; ++z)
       for (int64_t y = 0; y < size.y; ++y, out += size.x)
         std::memcpy(out, in.row(y, z), static_cast<size_t>(size.x) * sizeof(T));
+    if (!raster_.empty())
+      for (T* code = codes; code != out; ++code) *code = static_cast<T>(raster_(*code));
     return take(number, std::span<const T>(codes, out), grid_.extent(number));
   }
   template <class Take>
@@ -81,6 +87,7 @@ class PageReader {
   VolumeSource& source_;
   const PageGrid& grid_;
   const PackedParams& params_;
+  const Raster& raster_;
   std::vector<std::byte> voxels_;
 };
 
@@ -96,6 +103,39 @@ std::vector<std::pair<uint64_t, uint64_t>> runs_of(const PageGrid& grid, uint64_
   }
   return runs;
 }
+
+/// The codes of a coarser level as they were decoded, in a temporary file, page by page.
+class DecodedLevel {
+ public:
+  DecodedLevel(int level, const PageGrid& grid, int code_bytes)
+      : level_(level),
+        grid_(grid),
+        stride_(static_cast<size_t>(grid.side * grid.side * grid.side * code_bytes)) {}
+  int level() const { return level_; }
+  size_t page_bytes() const { return stride_; }
+  /// Pages in order, each of `page_bytes()`.
+  Status write(std::span<const std::byte> pages) { return file_.write(pages); }
+  Status finish() {
+    VOX_TRY(mapped_, file_.map());
+    return {};
+  }
+  /// The parents of a page of the next finer level.
+  template <class T>
+  page::Parent<T> parent_of(Index3 child) const {
+    const uint64_t number = grid_.number(child / int64_t{2});
+    page::Parent<T> parent = placed<T>(child, grid_);
+    parent.samples = {reinterpret_cast<const T*>(mapped_->bytes().data() + number * stride_),
+                      static_cast<size_t>(parent.extent.voxels())};
+    return parent;
+  }
+
+ private:
+  int level_;
+  PageGrid grid_;
+  size_t stride_;
+  TemporaryFile file_{"a coarser level"};
+  std::shared_ptr<const MappedFile> mapped_;
+};
 
 class Encoder {
  public:
@@ -114,22 +154,24 @@ class Encoder {
     VOX_CHECK(prepare());
     VOX_CHECK(add_volume_info(container_, info_));
     VOX_CHECK(container_.add(packed_kind, 0, 0, pack_params(params_)));
-    // The model of coarser levels is fitted to the largest of them.
-    std::optional<page::Model> coarse;
-    if (params_.levels > 1) {
-      VOX_TRY(coarse, fit(1));
-      VOX_CHECK(container_.add(model_kind, 1, 0, coarse->serialise()));
+    // The coarsest level has no parents; the model of those between is fitted to the largest of them.
+    const int top = params_.levels - 1;
+    std::optional<page::Model> model;
+    for (int level = top; level >= 0; --level) {
+      if (level == top || level == top - 1 || level == 0) {
+        const int fitted = level == 0 || level == top ? level : 1;
+        VOX_TRY(model, fit(fitted));
+        VOX_CHECK(container_.add(model_kind, static_cast<uint32_t>(fitted), 0, model->serialise()));
+      }
+      VOX_CHECK(encode(level, *model));
     }
-    for (int level = params_.levels - 1; level > 0; --level) VOX_CHECK(encode(level, *coarse));
-    VOX_TRY(const page::Model fine, fit(0));
-    VOX_CHECK(container_.add(model_kind, 0, 0, fine.serialise()));
-    VOX_CHECK(encode(0, fine));
     VOX_CHECK(container_.finish());
     return params_;
   }
 
  private:
   VolumeSource& source(int level) { return level == 0 ? source_ : *coarser_[static_cast<size_t>(level - 1)]; }
+  const Raster& raster(int level) const { return level == 0 ? all_values_ : raster_; }
   PageGrid grid(int level) { return {source(level).info().dims, params_.page_side}; }
 
   /// The first pass.
@@ -146,6 +188,8 @@ class Encoder {
     }
     if (info_.format == VoxelFormat::float32) {
       VOX_CHECK(choose_map());
+    } else if (params_.max_error < 1 && !info_.is_labels && !info_.fill) {
+      raster_ = Raster(survey_.values());
     }
     return {};
   }
@@ -172,7 +216,7 @@ class Encoder {
   Status sample_pages(int level, const Take& take) {
     const PageGrid pages = grid(level);
     const uint64_t count = std::min(pages.pages(), most_samples);
-    PageReader reader(source(level), pages, params_);
+    PageReader reader(source(level), pages, params_, raster(level));
     const uint64_t all = pages.pages();
     uint64_t stride = all - all * 382 / 1000;  // near the golden section; all is below 2^50
     while (std::gcd(stride, all) != 1) ++stride;
@@ -183,21 +227,56 @@ class Encoder {
   /// Bytes of these pages, and of the model.
   Result<uint64_t> sampled_bytes(int level, const page::Model& model) {
     std::vector<std::byte> bytes = model.serialise();
-    VOX_CHECK(sample_pages(level, [&](uint64_t, auto codes, page::Extent extent) {
-      return page::encode_page(model, codes, extent, bytes);
+    VOX_CHECK(sample_pages(level, [&](uint64_t number, auto codes, page::Extent extent) -> Status {
+      using T = std::remove_const_t<typename decltype(codes)::element_type>;
+      std::vector<T> codes_above;
+      page::Parent<T> parent;
+      if (model.has_parents()) {
+        VOX_TRY(parent, parent_of(level, number, codes_above));
+      }
+      return page::encode_page(model, codes, extent, bytes, parent);
     }));
     return bytes.size();
   }
 
+  /// The parents of a page: as they were decoded, or, where that is still to come, about so, in `room`.
+  template <class T>
+  Result<page::Parent<T>> parent_of(int level, uint64_t number, std::vector<T>& room) {
+    const Index3 child = grid(level).index(number);
+    if (decoded_ && decoded_->level() == level + 1) return decoded_->parent_of<T>(child);
+    const PageGrid above = grid(level + 1);
+    const uint64_t parent_number = above.number(child / int64_t{2});
+    const auto bound = info_.format == VoxelFormat::float32 ? 0u : static_cast<uint32_t>(params_.max_error);
+    const uint64_t step = 2 * uint64_t{bound} + 1;
+    VOX_CHECK(PageReader(source(level + 1), above, params_, raster(level + 1))
+                  .read(parent_number, parent_number + 1, [&](uint64_t, auto codes, page::Extent) -> Status {
+                    for (const auto code : codes)
+                      room.push_back(static_cast<T>(
+                          std::min<uint64_t>((code + bound) / step * step, std::numeric_limits<T>::max())));
+                    return {};
+                  }));
+    page::Parent<T> parent = placed<T>(child, above);
+    parent.samples = room;
+    return parent;
+  }
+
   Result<page::Model> fit(int level) {
     page::ModelBuilder builder;
-    VOX_TRY(const Reservation memory, Reservation::take(most_samples * page::max_voxels * sizeof(uint32_t),
-                                                        "pages to fit a model to", ctx_));
-    VOX_CHECK(sample_pages(level, [&](uint64_t, auto codes, page::Extent extent) -> Status {
-      builder.add(codes, extent);
+    VOX_TRY(const Reservation memory,
+            Reservation::take(2 * most_samples * page::max_voxels * sizeof(uint32_t),
+                              "pages to fit a model to", ctx_));
+    page::ModelOptions options;
+    options.parents = level + 1 < params_.levels;
+    VOX_CHECK(sample_pages(level, [&](uint64_t number, auto codes, page::Extent extent) -> Status {
+      using T = std::remove_const_t<typename decltype(codes)::element_type>;
+      std::vector<T> room;
+      page::Parent<T> parent;
+      if (options.parents) {
+        VOX_TRY(parent, parent_of(level, number, room));
+      }
+      builder.add(codes, extent, parent);
       return {};
     }));
-    page::ModelOptions options;
     if (info_.format == VoxelFormat::float32) {
       const bool steps = params_.map.kind == CodeKind::steps;
       options.max_sample = steps ? params_.map.code(static_cast<float>(survey_.range().hi)) : 0xffffffff;
@@ -209,10 +288,12 @@ class Encoder {
       // Means of voxels may be other values.
       const bool same_values = level == 0 || info_.is_labels || info_.format == VoxelFormat::bitmap;
       if (options.max_error == 0 && same_values) options.values = values;
+      if (level > 0 && !raster_.empty()) options.values = raster_.values();
       // Values that are few beside the steps of the bound may take fewer bytes than these.
       const uint64_t steps = options.max_sample / (2 * uint64_t{options.max_error} + 1) + 1;
       if (options.max_error > 0 && values.size() <= 2 * steps && level == 0) {
         page::ModelOptions exact;
+        exact.parents = options.parents;
         exact.max_sample = options.max_sample;
         exact.values = values;
         VOX_TRY(const page::Model bounded, builder.build(options));
@@ -227,6 +308,8 @@ class Encoder {
 
   Status encode(int level, const page::Model& model) {
     const PageGrid pages = grid(level);
+    auto decoded = std::make_unique<DecodedLevel>(level, pages, code_bytes(info_.format));
+    std::vector<std::byte> batch;  // of decoded pages
     const auto batch_parts = static_cast<uint64_t>(2 * ctx_.threads);
     for (uint64_t part = 0; part < pages.parts(); part += batch_parts) {
       const uint64_t end_part = std::min(part + batch_parts, pages.parts()),
@@ -234,13 +317,22 @@ class Encoder {
                      last = std::min(end_part * pages.pages_a_part(), pages.pages());
       std::vector<std::vector<std::byte>> encoded(last - first);
       const auto runs = runs_of(pages, first, last);
+      if (level > 0) batch.resize((last - first) * decoded->page_bytes());
       VOX_CHECK(parallel_for(ctx_, static_cast<int64_t>(runs.size()), [&](int64_t i) -> Status {
-        PageReader reader(source(level), pages, params_);
+        PageReader reader(source(level), pages, params_, raster(level));
         const auto [begin, end] = runs[static_cast<size_t>(i)];
         return reader.read(begin, end, [&](uint64_t number, auto codes, page::Extent extent) {
-          return page::encode_page(model, codes, extent, encoded[number - first]);
+          using T = std::remove_const_t<typename decltype(codes)::element_type>;
+          page::Parent<T> parent;
+          if (model.has_parents()) parent = decoded_->parent_of<T>(pages.index(number));
+          std::span<T> kept;
+          if (level > 0)
+            kept = {reinterpret_cast<T*>(batch.data() + (number - first) * decoded->page_bytes()),
+                    codes.size()};
+          return page::encode_page(model, codes, extent, encoded[number - first], parent, kept);
         });
       }));
+      if (level > 0) VOX_CHECK(decoded->write(batch));
       std::span<const std::vector<std::byte>> left = encoded;
       for (uint64_t p = part; p < end_part; ++p) {
         const uint64_t count = pages.pages_of(p);
@@ -250,6 +342,8 @@ class Encoder {
       source(level).release(pages.box(first).lo.z, pages.box(last - 1).lo.z);
       if (level == 0) ctx_.progress(static_cast<double>(last) / static_cast<double>(pages.pages()));
     }
+    if (level > 0) VOX_CHECK(decoded->finish());
+    decoded_ = std::move(decoded);
     return {};
   }
 
@@ -258,7 +352,10 @@ class Encoder {
   Context& ctx_;
   PackedParams params_;
   Survey survey_;
+  const Raster all_values_;
+  Raster raster_;  ///< of coarser levels
   std::vector<std::unique_ptr<VolumeSource>> coarser_;
+  std::unique_ptr<DecodedLevel> decoded_;  ///< the level above that which comes next
   ContainerWriter container_;
 };
 

@@ -9,13 +9,14 @@
 #include <vector>
 
 #include "formats/container.h"
-#include "libpage/extent.h"
+#include "libpage/page.h"
 #include "libsvmm/packed/packed.h"
 
 namespace voxkit::svmm {
 
 inline constexpr uint32_t packed_kind = chunk_kind("PAKP");
-inline constexpr uint32_t model_kind = chunk_kind("MODL");  ///< index: level
+/// Index: level; it is the model of coarser levels, too, up to the next that has one.
+inline constexpr uint32_t model_kind = chunk_kind("MODL");
 inline constexpr uint32_t pages_kind = chunk_kind("PAGE");  ///< index: level; part: run of pages
 
 /// Level 31 of the longest side is one voxel.
@@ -42,9 +43,12 @@ struct PageGrid {
   uint64_t number(Index3 page) const {
     return static_cast<uint64_t>((page.z * count.y + page.y) * count.x + page.x);
   }
-  Box box(uint64_t number) const {
+  Index3 index(uint64_t number) const {
     const auto n = static_cast<int64_t>(number);
-    const Index3 lo = Index3(n % count.x, n / count.x % count.y, n / (count.x * count.y)) * side;
+    return {n % count.x, n / count.x % count.y, n / (count.x * count.y)};
+  }
+  Box box(uint64_t number) const {
+    const Index3 lo = index(number) * side;
     return {lo, glm::min(lo + side, dims)};
   }
   page::Extent extent(uint64_t number) const {
@@ -56,6 +60,18 @@ struct PageGrid {
   uint64_t parts() const { return (pages() + pages_a_part() - 1) / pages_a_part(); }
   uint64_t pages_of(uint64_t part) const { return std::min(pages_a_part(), pages() - part * pages_a_part()); }
 };
+
+/// Where the parents of page `child` lie in their page, which is number `above.number(child / 2)` of the
+/// level above; without samples.
+template <class T>
+page::Parent<T> placed(Index3 child, const PageGrid& above) {
+  const Index3 at = child % int64_t{2} * (above.side / 2);
+  return {{},
+          above.extent(above.number(child / int64_t{2})),
+          static_cast<int>(at.x),
+          static_cast<int>(at.y),
+          static_cast<int>(at.z)};
+}
 
 std::vector<std::byte> pack_params(const PackedParams& params);
 /// Errors: ErrorCode::input, naming `file`.

@@ -25,13 +25,12 @@ struct PackedVolume::Pages {
     std::vector<size_t> chunks;  ///< by part: index into the container's table
     /// Parts whose lengths were found to be right.
     std::unique_ptr<std::atomic<bool>[]> checked;
-    const page::Model* model = nullptr;
+    std::optional<page::Model> model;  ///< none: not yet known
   };
   explicit Pages(MemoryBudget& memory) : cache(memory) {}
 
   std::vector<Level> levels;
-  std::vector<page::Model> models;  ///< of level 0, and of those above
-  mutable PageCache cache;
+  mutable PageCache cache;  ///< of codes
   mutable std::atomic<uint64_t> decoded{0};
 
   /// The pages of a part; ErrorCode::input where it is damaged.
@@ -116,13 +115,12 @@ Result<std::shared_ptr<const PackedVolume>> PackedVolume::open(std::shared_ptr<c
     volume->levels_.push_back({level.grid.dims, level.grid.count, 0, 0, 0});
     pages.levels.push_back(std::move(level));
   }
-  std::array<size_t, 2> models{none, none};
+  std::vector<size_t> models(pages.levels.size(), none);
   for (size_t i = 0; i < table.size(); ++i) {
     const ChunkEntry& entry = table[i];
     if (entry.kind != pages_kind && entry.kind != model_kind) continue;
     size_t* slot = nullptr;
-    if (entry.kind == model_kind && entry.part == 0 &&
-        entry.index < static_cast<uint32_t>(std::min(levels, 2)))
+    if (entry.kind == model_kind && entry.part == 0 && entry.index < static_cast<uint32_t>(levels))
       slot = &models[entry.index];
     if (entry.kind == pages_kind && entry.index < static_cast<uint32_t>(levels) &&
         entry.part < pages.levels[entry.index].chunks.size())
@@ -138,8 +136,12 @@ Result<std::shared_ptr<const PackedVolume>> PackedVolume::open(std::shared_ptr<c
   for (size_t i = 0; i < pages.levels.size(); ++i)
     for (size_t part = 0; part < pages.levels[i].chunks.size(); ++part)
       if (pages.levels[i].chunks[part] == none) return bad(fmt::format("no chunk PAGE {}.{}", i, part));
-  for (size_t i = 0; i < static_cast<size_t>(std::min(levels, 2)); ++i) {
-    if (models[i] == none) return bad(fmt::format("no chunk MODL {}.0", i));
+  for (size_t i = 0; i < pages.levels.size(); ++i) {
+    if (models[i] == none) {
+      if (i == 0) return bad("no chunk MODL 0.0");
+      pages.levels[i].model = pages.levels[i - 1].model;
+      continue;
+    }
     VOX_TRY(const auto model_bytes, container->chunk(models[i]));
     auto model = page::Model::parse(model_bytes);
     if (!model) return bad(fmt::format("chunk MODL {}.0: {}", i, model.error().what));
@@ -149,12 +151,62 @@ Result<std::shared_ptr<const PackedVolume>> PackedVolume::open(std::shared_ptr<c
     if (model->max_sample() > most)
       return bad(fmt::format("chunk MODL {}.0: samples up to {}: expected at most {}", i, model->max_sample(),
                              most));
-    pages.models.push_back(std::move(*model));
+    pages.levels[i].model = std::move(*model);
   }
-  for (size_t i = 0; i < pages.levels.size(); ++i)
-    pages.levels[i].model = &pages.models[std::min<size_t>(i, 1)];
+  if (pages.levels.back().model->has_parents())
+    return bad("the model of the coarsest level: expected one without parents");
   volume->container_ = std::move(container);
   return std::shared_ptr<const PackedVolume>(volume);
+}
+
+/// The coarser pages that were last used: pages that lie together mostly have the same.
+using Ancestors = std::array<std::pair<uint64_t, std::shared_ptr<const PageCache::Page>>, max_packed_levels>;
+
+template <class T>
+Result<std::shared_ptr<const PageCache::Page>> codes_of(const Container& container, const auto& pages,
+                                                        int level, uint64_t number, Ancestors& ancestors);
+
+/// The parents of a page whose model has them; what holds their samples is kept in `ancestors`.
+template <class T>
+Result<page::Parent<T>> parent_of(const Container& container, const auto& pages, int level, uint64_t number,
+                                  Ancestors& ancestors) {
+  const PageGrid& above = pages.levels[static_cast<size_t>(level + 1)].grid;
+  const Index3 child = pages.levels[static_cast<size_t>(level)].grid.index(number);
+  VOX_TRY(const auto codes,
+          codes_of<T>(container, pages, level + 1, above.number(child / int64_t{2}), ancestors));
+  page::Parent<T> parent = placed<T>(child, above);
+  parent.samples = {reinterpret_cast<const T*>(codes->data()), codes->size() / sizeof(T)};
+  return parent;
+}
+
+/// The codes of a page, kept or decoded, and those of the coarser ones that this takes.
+template <class T>
+Result<std::shared_ptr<const PageCache::Page>> codes_of(const Container& container, const auto& pages,
+                                                        int level, uint64_t number, Ancestors& ancestors) {
+  auto& [last_number, last] = ancestors[static_cast<size_t>(level)];
+  if (last && last_number == number) return last;
+  const PageCache::Key key{level, number};
+  auto found = pages.cache.find(key);
+  if (!found) {
+    const auto& l = pages.levels[static_cast<size_t>(level)];
+    page::Parent<T> parent;
+    if (l.model->has_parents()) {
+      VOX_TRY(parent, parent_of<T>(container, pages, level, number, ancestors));
+    }
+    VOX_TRY(const auto bytes, pages.page(container, level, number));
+    const page::Extent extent = l.grid.extent(number);
+    const auto count = static_cast<size_t>(extent.voxels());
+    auto made = std::make_shared<PageCache::Page>(count * sizeof(T));
+    const Status status = page::decode_page(*l.model, bytes, extent,
+                                            std::span<T>(reinterpret_cast<T*>(made->data()), count), parent);
+    if (!status) return tl::unexpected<Error>(at_page(container, level, number, l.grid, status.error()));
+    ++pages.decoded;
+    found = std::move(made);
+    pages.cache.keep(key, found);
+  }
+  last_number = number;
+  last = found;
+  return found;
 }
 
 template <class T>
@@ -167,6 +219,7 @@ Status decode_box(const Container& container, const PackedVolume& volume, const 
   std::array<page::PageJob<T>, most_jobs> jobs;
   std::array<uint64_t, most_jobs> numbers;
   size_t waiting = 0;
+  Ancestors ancestors;
   const auto flush = [&]() -> Status {
     size_t failed = 0;
     const auto batch = std::span<const page::PageJob<T>>(jobs).first(waiting);
@@ -178,17 +231,33 @@ Status decode_box(const Container& container, const PackedVolume& volume, const 
     waiting = 0;
     return {};
   };
-  for (int64_t z = first.z; z < last.z; ++z)
-    for (int64_t y = first.y; y < last.y; ++y)
-      for (int64_t x = first.x; x < last.x; ++x) {
-        const uint64_t number = grid.number({x, y, z});
-        VOX_TRY(const auto bytes, pages.page(container, level, number));
-        const page::Extent extent = grid.extent(number);
-        numbers[waiting] = number;
-        jobs[waiting] = {
-            bytes, extent,
-            std::span(buffer).subspan(waiting * page::max_voxels, static_cast<size_t>(extent.voxels()))};
-        if (++waiting == most_jobs) VOX_CHECK(flush());
+  const auto add = [&](Index3 at) -> Status {
+    const uint64_t number = grid.number(at);
+    VOX_TRY(const auto bytes, pages.page(container, level, number));
+    const page::Extent extent = grid.extent(number);
+    numbers[waiting] = number;
+    jobs[waiting] = {
+        bytes,
+        extent,
+        std::span(buffer).subspan(waiting * page::max_voxels, static_cast<size_t>(extent.voxels())),
+        {}};
+    if (l.model->has_parents()) {
+      VOX_TRY(jobs[waiting].parent, parent_of<T>(container, pages, level, number, ancestors));
+    }
+    return ++waiting == most_jobs ? flush() : Status();
+  };
+  // The up to 8 pages of one parent after each other. What a job's parents lie in must be there until it is
+  // done.
+  const Index3 first_parent = first / int64_t{2}, last_parent = (last + int64_t{1}) / int64_t{2};
+  for (int64_t z = first_parent.z; z < last_parent.z; ++z)
+    for (int64_t y = first_parent.y; y < last_parent.y; ++y)
+      for (int64_t x = first_parent.x; x < last_parent.x; ++x) {
+        for (int i = 0; i < 8; ++i) {
+          const Index3 at = Index3(x, y, z) * int64_t{2} + Index3(i & 1, i >> 1 & 1, i >> 2);
+          if (glm::all(glm::greaterThanEqual(at, first)) && glm::all(glm::lessThan(at, last)))
+            VOX_CHECK(add(at));
+        }
+        if (waiting > 0 && l.model->has_parents()) VOX_CHECK(flush());
       }
   return waiting > 0 ? flush() : Status();
 }
@@ -205,23 +274,33 @@ Status PackedVolume::decode(const Box& box, int level, VoxelSpan out) const {
   }
 }
 
-Result<Voxel> PackedVolume::sample(Index3 voxel, int level) const {
-  const PageGrid& grid = pages_->levels[static_cast<size_t>(level)].grid;
-  const PageCache::Key key{level, grid.number(voxel / grid.side)};
-  const Box box = grid.box(key.number);
-  const int bytes = voxel_bytes(info_.format);
-  auto page = pages_->cache.find(key);
-  if (!page) {
-    auto made = std::make_shared<PageCache::Page>(static_cast<size_t>(box.voxels() * bytes));
-    VOX_CHECK(decode(box, level, packed(made->data(), box.size(), info_.format)));
-    page = std::move(made);
-    pages_->cache.keep(key, page);
-  }
+template <class T>
+Result<Voxel> sample_of(const Container& container, const PackedVolume& volume, const auto& pages,
+                        Index3 voxel, int level) {
+  const PageGrid& grid = pages.levels[static_cast<size_t>(level)].grid;
+  const uint64_t number = grid.number(voxel / grid.side);
+  Ancestors ancestors;
+  VOX_TRY(const auto codes, codes_of<T>(container, pages, level, number, ancestors));
+  const Box box = grid.box(number);
   const Index3 at = voxel - box.lo, size = box.size();
-  Voxel out;
-  std::memcpy(out.bytes.data(), page->data() + ((at.z * size.y + at.y) * size.x + at.x) * bytes,
-              static_cast<size_t>(bytes));
-  return out;
+  T code;
+  std::memcpy(&code, codes->data() + static_cast<size_t>((at.z * size.y + at.y) * size.x + at.x) * sizeof(T),
+              sizeof(T));
+  if constexpr (sizeof(T) == 4)
+    return Voxel::of(volume.params().map.value(code));
+  else
+    return Voxel::of(code);
+}
+
+Result<Voxel> PackedVolume::sample(Index3 voxel, int level) const {
+  switch (code_bytes(info_.format)) {
+    case 4:
+      return sample_of<uint32_t>(*container_, *this, *pages_, voxel, level);
+    case 2:
+      return sample_of<uint16_t>(*container_, *this, *pages_, voxel, level);
+    default:
+      return sample_of<uint8_t>(*container_, *this, *pages_, voxel, level);
+  }
 }
 
 std::optional<Voxel> PackedVolume::uniform(const Box& box, int level) const {

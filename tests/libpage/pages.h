@@ -60,4 +60,24 @@ inline std::vector<uint32_t> make_page(int kind, Extent e, uint32_t greatest, st
   return samples;
 }
 
+/// Means of 2^3, at the corner (x, y, z) of a page of so many more on its far sides, which are any.
+inline std::vector<uint32_t> make_parents(const std::vector<uint32_t>& samples, Extent e, Extent parents,
+                                          int x, int y, int z, uint32_t greatest, std::mt19937& random) {
+  std::vector<uint32_t> out;
+  for (int k = 0; k < parents.nz; ++k)
+    for (int j = 0; j < parents.ny; ++j)
+      for (int i = 0; i < parents.nx; ++i) {
+        uint64_t sum = 0, count = 0;
+        for (int child = 0; child < 8; ++child) {
+          const int cx = 2 * (i - x) + child % 2, cy = 2 * (j - y) + child / 2 % 2,
+                    cz = 2 * (k - z) + child / 4;
+          if (cx < 0 || cy < 0 || cz < 0 || cx >= e.nx || cy >= e.ny || cz >= e.nz) continue;
+          sum += samples[static_cast<size_t>((cz * e.ny + cy) * e.nx + cx)], ++count;
+        }
+        out.push_back(static_cast<uint32_t>(count == 0 ? random() % (uint64_t{greatest} + 1)
+                                                       : (2 * sum + count) / (2 * count)));
+      }
+  return out;
+}
+
 }  // namespace voxkit::page::test

@@ -58,11 +58,18 @@ inline constexpr std::array<Neighbour, 16> neighbours = {{{-1, -1, -1},
                                                           {0, -2, 0},
                                                           {0, 0, -2}}};
 
+/// A page of parents, and where in it those of the page lie.
+struct ReferenceParent {
+  std::vector<uint32_t> samples;
+  Extent extent;
+  int x = 0, y = 0, z = 0;
+};
+
 class ReferenceDecoder {
  public:
   explicit ReferenceDecoder(std::span<const std::byte> model) {
     ReferenceBits in(model);
-    in.get(8);
+    parents_ = in.get(8) == 2;
     const bool has_palette = in.get(1) != 0;
     max_value_ = static_cast<int64_t>(in.get(32));
     error_ = static_cast<int64_t>(in.golomb(0));
@@ -74,14 +81,14 @@ class ReferenceDecoder {
         next = uint64_t{palette_.back()} + 1;
       }
     }
-    for (int c = 0; c < 18; ++c) {
+    for (int c = 0; c < (parents_ ? 48 : 18); ++c) {
       const int rest = rest_of(c);
       int64_t left = 4096;
-      for (int t = 0; t < 16; ++t)
+      for (int t = 0; t < (parents_ ? 30 : 16); ++t)
         if (has(c, t) && t != rest) left -= weights_[c][t] = in.signed_golomb(7);
       if (rest >= 0) weights_[c][rest] = left;
     }
-    for (size_t c = 0; c < 72; ++c) {
+    for (size_t c = 0; c < (parents_ ? 192 : 72); ++c) {
       if (in.get(1) != 0) {
         parts_[c] = parts_[c - 1];
         continue;
@@ -99,8 +106,11 @@ class ReferenceDecoder {
     }
   }
 
-  std::vector<uint32_t> decode(std::span<const std::byte> page, Extent e) {
+  std::vector<uint32_t> decode(std::span<const std::byte> page, Extent e,
+                               const ReferenceParent& parent = {}) {
     extent_ = e;
+    parent_ = parent;
+    for (uint32_t& sample : parent_.samples) sample = number_next_to(sample);
     const auto count = static_cast<size_t>(e.voxels());
     values_.assign(count, 0);
     magnitudes_.assign(count, 0);
@@ -127,16 +137,54 @@ class ReferenceDecoder {
   bool finished() const { return state_ == 1 && words_.empty(); }
 
  private:
-  static bool has(int c, int t) {
-    const bool first_x = c % 3 == 0, last_x = c % 3 == 2, first_y = c / 3 % 3 == 0, last_y = c / 3 % 3 == 2;
-    const Neighbour n = neighbours[static_cast<size_t>(t)];
-    return !(n.dx < 0 && first_x) && !(n.dx > 0 && last_x) && !(n.dy < 0 && first_y) &&
-           !(n.dy > 0 && last_y) && !(n.dz < 0 && c < 9);
+  /// The entry of the palette next to a sample, the lower one of two.
+  uint32_t number_next_to(uint32_t sample) const {
+    if (palette_.empty()) return static_cast<uint32_t>(std::min<int64_t>(sample, max_value_));
+    size_t best = 0;
+    const auto distance = [&](size_t i) { return std::abs(int64_t{palette_[i]} - int64_t{sample}); };
+    for (size_t i = 1; i < palette_.size(); ++i)
+      if (distance(i) < distance(best)) best = i;
+    return static_cast<uint32_t>(best);
   }
-  static int rest_of(int c) {
+  /// With parents there are two classes between the first and the last along x and y, and two of planes that
+  /// have one behind, by whether the number there is odd.
+  int along(int at, int n) const {
+    if (at == 0) return 0;
+    if (at == n - 1) return parents_ ? 3 : 2;
+    return parents_ ? 1 + at % 2 : 1;
+  }
+  int class_of(int x, int y, int z) const {
+    const int sides = parents_ ? 4 : 3, plane = z == 0 ? 0 : parents_ ? 1 + z % 2 : 1;
+    return (plane * sides + along(y, extent_.ny)) * sides + along(x, extent_.nx);
+  }
+  bool has(int c, int t) const {
+    if (t >= 16) return true;
+    const int sides = parents_ ? 4 : 3, px = c % sides, py = c / sides % sides;
+    const Neighbour n = neighbours[static_cast<size_t>(t)];
+    return !(n.dx < 0 && px == 0) && !(n.dx > 0 && px == sides - 1) && !(n.dy < 0 && py == 0) &&
+           !(n.dy > 0 && py == sides - 1) && !(n.dz < 0 && c < sides * sides);
+  }
+  int rest_of(int c) const {
+    if (parents_) return 17;
     for (const int t : {4, 10, 12})
       if (has(c, t)) return t;
     return -1;
+  }
+  /// The parent of a voxel, or a neighbour of that.
+  int64_t parent_at(int x, int y, int z, int dx, int dy, int dz) const {
+    const Extent e = parent_.extent;
+    const int px = std::clamp(parent_.x + x / 2 + dx, 0, e.nx - 1),
+              py = std::clamp(parent_.y + y / 2 + dy, 0, e.ny - 1),
+              pz = std::clamp(parent_.z + z / 2 + dz, 0, e.nz - 1);
+    return parent_.samples[static_cast<size_t>((pz * e.ny + py) * e.nx + px)];
+  }
+  /// Taps 16 to 29.
+  int64_t parent_tap(int x, int y, int z, int t) const {
+    const int toward_y = y % 2 != 0 ? 1 : -1, toward_z = z % 2 != 0 ? 1 : -1;
+    if (t == 28) return parent_at(x, y, z, 0, -toward_y, 0);
+    if (t == 29) return parent_at(x, y, z, 0, 0, -toward_z);
+    const int row = (t - 16) / 3;
+    return parent_at(x, y, z, (t - 16) % 3 - 1, row % 2 != 0 ? toward_y : 0, row / 2 != 0 ? toward_z : 0);
   }
   size_t index(int x, int y, int z) const {
     const int cx = std::clamp(x, 0, extent_.nx - 1), cy = std::clamp(y, 0, extent_.ny - 1),
@@ -145,8 +193,7 @@ class ReferenceDecoder {
   }
 
   void decode_voxel(int x, int y, int z) {
-    const int px = x == 0 ? 0 : x == extent_.nx - 1 ? 2 : 1, py = y == 0 ? 0 : y == extent_.ny - 1 ? 2 : 1;
-    const int c = (z > 0 ? 9 : 0) + 3 * py + px;
+    const int c = class_of(x, y, z);
     // In units of 1/4096, with what rounds to the nearest, or the lower of two.
     int64_t mean = background_ * 4096 + 2047;
     if (rest_of(c) >= 0) {
@@ -156,6 +203,7 @@ class ReferenceDecoder {
           const Neighbour n = neighbours[static_cast<size_t>(t)];
           mean += weights_[c][t] * values_[index(x + n.dx, y + n.dy, z + n.dz)];
         }
+      for (int t = 16; parents_ && t < 30; ++t) mean += weights_[c][t] * parent_tap(x, y, z, t);
     }
     const int64_t predicted = std::clamp<int64_t>(mean >> 12, 0, max_value_);
     const bool mirrored = (mean >> 11 & 1) != 0;
@@ -169,31 +217,50 @@ class ReferenceDecoder {
     values_[index(x, y, z)] = std::clamp<int64_t>(value, 0, max_value_);
   }
 
+  int64_t range_share(int64_t least, int64_t greatest) const {
+    return std::min<int64_t>((greatest - least) * (32768 / (2 * error_ + 1)) >> 16, 1023);
+  }
   size_t context(int x, int y, int z) const {
-    if (y == 0 && z == 0 && x == 0) return 23;
+    if (y == 0 && z == 0 && x == 0 && !parents_) return 23;
     const auto m = [&](int dx, int dy, int dz) { return magnitudes_[index(x + dx, y + dy, z + dz)]; };
-    int64_t activity = 0;
+    int64_t activity = 0, share = 0;
+    int64_t least = INT64_MAX, greatest = 0;
+    const auto widen = [&](int64_t value) {
+      least = std::min(least, value);
+      greatest = std::max(greatest, value);
+    };
+    for (size_t t = 0; t < 12; ++t) {
+      const Neighbour n = neighbours[t];
+      if (z + n.dz < 0 || (n.dz == 0 && y == 0)) continue;
+      widen(values_[index(x + n.dx, y + n.dy, z + n.dz)]);
+    }
+    if (parents_) {
+      widen(parent_at(x, y, z, 0, 0, 0));
+      share = range_share(least, greatest);
+      least = INT64_MAX, greatest = 0;
+      for (int d = -1; d <= 1; ++d) {
+        widen(parent_at(x, y, z, d, 0, 0));
+        widen(parent_at(x, y, z, 0, d, 0));
+        widen(parent_at(x, y, z, 0, 0, d));
+      }
+      share = (share + range_share(least, greatest)) / 2;
+    } else if (y > 0 || z > 0) {
+      share = range_share(least, greatest);
+    }
+    activity = std::min<int64_t>(share, 737);
     if (y > 0 || z > 0) {
       const int uy = y > 0 ? -1 : 0, uz = y > 0 ? 0 : -1;  // above, or behind where there is no row above
       const int by = z > 0 ? 0 : -1, bz = z > 0 ? -1 : 0;  // behind, or above where there is no plane behind
-      activity =
-          2 * (m(0, uy, uz) + m(0, by, bz)) + m(-1, uy, uz) + m(1, uy, uz) + m(-1, by, bz) + m(1, by, bz);
-      int64_t least = INT64_MAX, greatest = 0;
-      for (size_t t = 0; t < 12; ++t) {
-        const Neighbour n = neighbours[t];
-        if (z + n.dz < 0 || (n.dz == 0 && y == 0)) continue;
-        const int64_t value = values_[index(x + n.dx, y + n.dy, z + n.dz)];
-        least = std::min(least, value);
-        greatest = std::max(greatest, value);
-      }
-      activity += std::min<int64_t>((greatest - least) * (32768 / (2 * error_ + 1)) >> 16, 1023);
+      activity = share + 2 * (m(0, uy, uz) + m(0, by, bz)) + m(-1, uy, uz) + m(1, uy, uz) + m(-1, by, bz) +
+                 m(1, by, bz);
       activity = std::min<int64_t>(activity, 737);
       if (x == 0) activity = std::min<int64_t>(activity + 2 * m(0, uy, uz), 737);
     }
     if (x > 0) activity += 2 * m(-1, 0, 0);
     constexpr int steps[] = {1,  2,  3,  4,  5,   6,   7,   8,   11,  15,  20, 27,
                              37, 49, 67, 90, 122, 164, 222, 299, 404, 546, 737};
-    const auto step = std::ranges::count_if(steps, [&](int least) { return activity >= least; });
+    const auto step = std::ranges::count_if(steps, [&](int from) { return activity >= from; });
+    if (parents_) return static_cast<size_t>((z % 2 * 4 + y % 2 * 2 + x % 2) * 24 + step);
     return static_cast<size_t>((z == 0 ? 0 : y == 0 ? 24 : 48) + step);
   }
 
@@ -239,8 +306,10 @@ class ReferenceDecoder {
 
   int64_t max_value_ = 0, error_ = 0, background_ = 0;
   std::vector<uint32_t> palette_;
-  int64_t weights_[18][16] = {};
-  std::array<std::array<uint64_t, 73>, 72> parts_{};
+  bool parents_ = false;
+  int64_t weights_[48][30] = {};
+  std::array<std::array<uint64_t, 73>, 192> parts_{};
+  ReferenceParent parent_;
   Extent extent_;
   std::vector<int64_t> values_, magnitudes_;
   uint64_t state_ = 1;

@@ -134,6 +134,53 @@ TEST(Packed, LevelsAreMeans) {
   }
 }
 
+/// Closed loop: what a level is predicted from is what the decoder has of the next one.
+TEST(Packed, LevelsAreWithinTheBoundOfTheirMeans) {
+  for (const VoxelFormat format : {VoxelFormat::density8, VoxelFormat::density16, VoxelFormat::float32})
+    for (const double bound : {1.0, 5.0, 40.0}) {
+      const VolumeInfo info = make_info({37, 70, 51}, format);
+      const Bytes voxels = bytes_of(make_voxels(info, Content::blobs, 7), format);
+      voxkit::test::MemorySource source(info, voxels);
+      const auto volume = open(encode(source, {.max_error = bound}).bytes);
+      ASSERT_TRUE(volume);
+      std::vector<double> means = numbers(voxels, format);
+      for (int level = 0; level < volume->params().levels; ++level) {
+        if (level > 0) {
+          const Index3 below = volume->levels()[static_cast<size_t>(level - 1)].dims,
+                       dims = level_dims(below, 1);
+          std::vector<double> next;
+          for (int64_t n = 0; n < dims.x * dims.y * dims.z; ++n)
+            next.push_back(mean_at(means, below, {n % dims.x, n / dims.x % dims.y, n / (dims.x * dims.y)},
+                                   format == VoxelFormat::float32));
+          means = next;
+        }
+        const auto near = numbers(decode(*volume, level), format);
+        for (size_t i = 0; i < means.size(); ++i)
+          ASSERT_LE(std::abs(means[i] - near[i]), bound * 1.000001) << "level " << level;
+      }
+    }
+}
+
+TEST(Packed, LevelsAreNoFinerThanTheVolume) {
+  const VolumeInfo info = make_info({40, 41, 42}, VoxelFormat::density16);
+  std::vector<Voxel> made = make_voxels(info, Content::noise, 4);
+  for (Voxel& voxel : made)
+    voxel = Voxel::of(static_cast<uint16_t>(1000 + voxel.as<uint16_t>() % 33 * 125 / 2));
+  const Bytes voxels = bytes_of(made, info.format);
+  voxkit::test::MemorySource source(info, voxels);
+  const auto volume = open(encode(source, {}).bytes);
+  ASSERT_TRUE(volume);
+  EXPECT_EQ(decode(*volume), voxels);
+  const auto finest = numbers(voxels, info.format), coarser = numbers(decode(*volume, 1), info.format);
+  const Index3 dims = volume->levels()[1].dims;
+  for (size_t i = 0; i < coarser.size(); ++i) {
+    const auto n = static_cast<int64_t>(i);
+    const Index3 at(n % dims.x, n / dims.x % dims.y, n / (dims.x * dims.y));
+    ASSERT_LE(std::abs(coarser[i] - mean_at(finest, info.dims, at, false)), 32.0);
+    ASSERT_NE(std::find(finest.begin(), finest.end(), coarser[i]), finest.end());
+  }
+}
+
 TEST(Packed, LevelsOfLabelsAreTheCommonest) {
   VolumeInfo info = make_info({3, 2, 2}, VoxelFormat::density8);
   info.dims = {18, 2, 2};
@@ -197,7 +244,8 @@ TEST(Packed, ABoxTouchesItsPagesOnly) {
   const auto volume = open(encode(source, {}).bytes);
   const Box box{{15, 16, 31}, {33, 32, 33}};
   const Bytes part = decode(*volume, 0, box);
-  EXPECT_EQ(volume->pages_decoded(), 3u * 1 * 2);
+  // They and those of coarser levels that they are predicted from: 2 x 1 x 2, 1 x 1 x 1, and the last.
+  EXPECT_EQ(volume->pages_decoded(), 6u + 4 + 1 + 1);
   for (int64_t z = box.lo.z, i = 0; z < box.hi.z; ++z)
     for (int64_t y = box.lo.y; y < box.hi.y; ++y)
       for (int64_t x = box.lo.x; x < box.hi.x; ++x, ++i) {
@@ -207,7 +255,21 @@ TEST(Packed, ABoxTouchesItsPagesOnly) {
         ASSERT_TRUE(one);
         ASSERT_EQ(one->bytes[0], expected);
       }
-  EXPECT_EQ(volume->pages_decoded(), 12u);  // each of them once more, then they were kept
+  EXPECT_EQ(volume->pages_decoded(), 18u);  // each of them once more, then they were kept
+  const auto alone = open(encode(source, {.levels = false}).bytes);
+  EXPECT_EQ(decode(*alone, 0, box), part);
+  EXPECT_EQ(alone->pages_decoded(), 6u);
+}
+
+TEST(Packed, CoarserPagesAreDecodedOnce) {
+  const VolumeInfo info = make_info({200, 70, 130}, VoxelFormat::density16);
+  voxkit::test::MemorySource source(info, bytes_of(make_voxels(info, Content::blobs, 8), info.format));
+  const auto volume = open(encode(source, {}).bytes);
+  uint64_t pages = 0;
+  for (const PackedLevel& level : volume->levels())
+    pages += static_cast<uint64_t>(level.pages.x * level.pages.y * level.pages.z);
+  decode(*volume);
+  EXPECT_EQ(volume->pages_decoded(), pages);
 }
 
 TEST(Packed, OneValueTakesNoBytesAndIsKnown) {
