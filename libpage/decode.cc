@@ -8,49 +8,66 @@
 namespace voxkit::page {
 namespace {
 
-/// Pages of one extent, all of them with residuals.
-template <class Width, int lane_count, class T>
-[[gnu::always_inline]] inline void decode_group_body(const ModelData& model, const PageJob<T>* const* jobs,
-                                                     bool* whole) {
-  std::array<Lane<Width>, lane_count> lanes;
-  std::array<T*, lane_count> out;
-  for (size_t n = 0; n < lane_count; ++n) {
-    lanes[n].coder.open(jobs[n]->page);
-    out[n] = jobs[n]->out.data();
-    if (model.classes.parents) load_parents(model, jobs[n]->parent, jobs[n]->extent, lanes[n].memory);
-  }
-  const Extent extent = jobs[0]->extent;
-  const uint32_t* const palette = model.palette.empty() ? nullptr : model.palette.data();
+/// Decodes the pages of some lanes, all of one extent, row by row. What they become does not depend on the
+/// type of samples, so that there are few of these, which are much to compile.
+template <class Width, int lane_count>
+[[gnu::always_inline]] inline void decode_rows_body(const ModelData& model, Extent extent,
+                                                    std::array<Lane<Width>, lane_count>& lanes,
+                                                    std::array<typename Width::Stored*, lane_count> out) {
+  using Stored = typename Width::Stored;
   decode_lanes<Width, lane_count>(
-      model, extent, lanes, [&](size_t n, const typename Width::Stored* row) __attribute__((always_inline)) {
-        const auto nx = static_cast<size_t>(extent.nx);
-        for (size_t x = 0; x < nx; ++x) {
-          const uint32_t value = static_cast<uint32_t>(row[x]) + static_cast<uint32_t>(Width::offset);
-          out[n][x] = static_cast<T>(palette ? palette[value] : value);
-        }
-        out[n] += nx;
+      model, extent, lanes, [&](size_t n, const Stored* row) __attribute__((always_inline)) {
+        std::copy(row, row + extent.nx, out[n]);
+        out[n] += extent.nx;
       });
-  for (size_t n = 0; n < lane_count; ++n) whole[n] = lanes[n].coder.finished();
 }
 
-template <class Width, int lane_count, class T>
-void decode_group_anywhere(const ModelData& model, const PageJob<T>* const* jobs, bool* whole) {
-  decode_group_body<Width, lane_count>(model, jobs, whole);
+template <class Width, int lane_count>
+void decode_rows_anywhere(const ModelData& model, Extent extent, std::array<Lane<Width>, lane_count>& lanes,
+                          const std::array<typename Width::Stored*, lane_count>& out) {
+  decode_rows_body<Width, lane_count>(model, extent, lanes, out);
 }
 #ifdef VOXKIT_AVX2
-template <class Width, int lane_count, class T>
-VOXKIT_AVX2_CODE void decode_group_avx2(const ModelData& model, const PageJob<T>* const* jobs, bool* whole) {
-  decode_group_body<Width, lane_count>(model, jobs, whole);
+template <class Width, int lane_count>
+VOXKIT_AVX2_CODE void decode_rows_avx2(const ModelData& model, Extent extent,
+                                       std::array<Lane<Width>, lane_count>& lanes,
+                                       const std::array<typename Width::Stored*, lane_count>& out) {
+  decode_rows_body<Width, lane_count>(model, extent, lanes, out);
 }
 #endif
 
 /// The same on every machine, and as fast as it can.
+template <class Width, int lane_count>
+void decode_rows(const ModelData& model, Extent extent, std::array<Lane<Width>, lane_count>& lanes,
+                 const std::array<typename Width::Stored*, lane_count>& out) {
+#ifdef VOXKIT_AVX2
+  if (has_avx2()) return decode_rows_avx2<Width, lane_count>(model, extent, lanes, out);
+#endif
+  decode_rows_anywhere<Width, lane_count>(model, extent, lanes, out);
+}
+
+/// Pages of one extent, all of them with residuals.
 template <class Width, int lane_count, class T>
 void decode_group(const ModelData& model, const PageJob<T>* const* jobs, bool* whole) {
-#ifdef VOXKIT_AVX2
-  if (has_avx2()) return decode_group_avx2<Width, lane_count>(model, jobs, whole);
-#endif
-  decode_group_anywhere<Width, lane_count>(model, jobs, whole);
+  using Stored = typename Width::Stored;
+  std::array<Lane<Width>, lane_count> lanes;
+  std::array<std::array<Stored, max_voxels>, lane_count> values;
+  std::array<Stored*, lane_count> out;
+  for (size_t n = 0; n < lane_count; ++n) {
+    lanes[n].coder.open(jobs[n]->page);
+    out[n] = values[n].data();
+    if (model.classes.parents) load_parents(model, jobs[n]->parent, jobs[n]->extent, lanes[n].memory);
+  }
+  decode_rows<Width, lane_count>(model, jobs[0]->extent, lanes, out);
+  const uint32_t* const palette = model.palette.empty() ? nullptr : model.palette.data();
+  for (size_t n = 0; n < lane_count; ++n) {
+    whole[n] = lanes[n].coder.finished();
+    T* const samples = jobs[n]->out.data();
+    for (size_t i = 0; i < jobs[n]->out.size(); ++i) {
+      const uint32_t value = static_cast<uint32_t>(values[n][i]) + static_cast<uint32_t>(Width::offset);
+      samples[i] = static_cast<T>(palette ? palette[value] : value);
+    }
+  }
 }
 
 template <class T>
@@ -104,12 +121,11 @@ Status decode_all(const Model& shared, std::span<const PageJob<T>> jobs, size_t*
         decode_group<Wide, group>(model, waiting.data(), whole.data());
       else
         decode_group<Narrow, group>(model, waiting.data(), whole.data());
-    } else {
-      for (size_t n = 0; n < count; ++n)
-        if (model.wide())
-          decode_group<Wide, 1>(model, &waiting[n], &whole[n]);
-        else
-          decode_group<Narrow, 1>(model, &waiting[n], &whole[n]);
+    } else if (count == 1) {
+      if (model.wide())
+        decode_group<Wide, 1>(model, waiting.data(), whole.data());
+      else
+        decode_group<Narrow, 1>(model, waiting.data(), whole.data());
     }
     for (size_t n = 0; n < count; ++n) judge(waiting[n], whole[n]);
     count = 0;

@@ -327,11 +327,13 @@ Status PackedVolume::check(Context& ctx) const {
   for (size_t i = 0; i < container_->table().size(); ++i) VOX_CHECK(container_->chunk(i));
   for (size_t level = 0; level < pages_->levels.size(); ++level) {
     const PageGrid& grid = pages_->levels[level].grid;
-    VOX_CHECK(parallel_for(ctx, grid.count.z * grid.count.y, [&](int64_t i) -> Status {
-      const Index3 lo = Index3(0, i % grid.count.y, i / grid.count.y) * grid.side;
-      const Box row{lo, glm::min(Index3(grid.dims.x, lo.y + grid.side, lo.z + grid.side), grid.dims)};
-      std::vector<std::byte> voxels(static_cast<size_t>(row.voxels() * voxel_bytes(info_.format)));
-      return decode(row, static_cast<int>(level), packed(voxels.data(), row.size(), info_.format));
+    constexpr int64_t run = 32;  // pages
+    const Index3 runs((grid.count.x + run - 1) / run, grid.count.y, grid.count.z);
+    VOX_CHECK(parallel_for(ctx, runs.x * runs.y * runs.z, [&](int64_t i) -> Status {
+      const Index3 lo = Index3(i % runs.x * run, i / runs.x % runs.y, i / (runs.x * runs.y)) * grid.side;
+      const Box box{lo, glm::min(lo + Index3(run, 1, 1) * grid.side, grid.dims)};
+      std::vector<std::byte> voxels(static_cast<size_t>(box.voxels() * voxel_bytes(info_.format)));
+      return decode(box, static_cast<int>(level), packed(voxels.data(), box.size(), info_.format));
     }));
   }
   return {};

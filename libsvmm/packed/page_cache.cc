@@ -11,7 +11,7 @@ constexpr uint64_t entry_bytes = 160;
 }  // namespace
 
 PageCache::PageCache(MemoryBudget& memory)
-    : memory_(memory), shard_limit_(std::min(memory.limit() / 8, uint64_t{256} << 20) / shards_.size()) {}
+    : memory_(memory), shard_limit_(std::min(memory.limit() / 8, uint64_t{256} << 20) / shard_count) {}
 
 PageCache::~PageCache() {
   for (Shard& shard : shards_) memory_.release(shard.bytes);

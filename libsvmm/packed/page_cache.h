@@ -48,12 +48,13 @@ class PageCache {
     std::unordered_map<Key, std::list<Entry>::iterator, Hash> places;
     uint64_t bytes = 0;
   };
-  Shard& shard_of(const Key& key) { return shards_[Hash()(key) >> 40 & (shards_.size() - 1)]; }
+  static constexpr size_t shard_count = 16;
+  Shard& shard_of(const Key& key) { return shards_[Hash()(key) >> 40 & (shard_count - 1)]; }
   void drop_last(Shard& shard);
 
   MemoryBudget& memory_;
   uint64_t shard_limit_;
-  std::array<Shard, 16> shards_;
+  std::array<Shard, shard_count> shards_;
 };
 
 }  // namespace voxkit::svmm
