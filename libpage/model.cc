@@ -109,7 +109,7 @@ Result<Model> Model::parse(std::span<const std::byte> bytes) {
   m.max_error = in.golomb(0);
   m.background = in.golomb(8);
   if (in.overrun()) return wrong("cut off: expected its bounds");
-  if (m.max_error > most_error) return wrong("error bound: expected at most 2^31 - 1");
+  if (m.max_error > most_error) return wrong("error bound: expected at most 2^31 - 2");
   if (m.background > m.max_value) return wrong("background: expected at most the greatest sample");
   if (has_palette) {
     if (m.max_error != 0 || m.max_value > 0xffff)

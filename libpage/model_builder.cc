@@ -185,7 +185,7 @@ bool number(std::span<const uint32_t> palette, std::vector<uint32_t>& samples) {
 Result<Model> ModelBuilder::build(const ModelOptions& options) const {
   const std::vector<uint32_t>& values = options.values;
   const uint32_t max_sample = pages_.empty() ? options.max_sample : std::min(options.max_sample, type_max_);
-  if (options.max_error > most_error) return bad_usage("page model: expected an error bound below 2^31");
+  if (options.max_error > most_error) return bad_usage("page model: expected an error bound below 2^31 - 1");
   if (values.size() > most_palette ||
       std::ranges::adjacent_find(values, std::ranges::greater_equal()) != values.end())
     return bad_usage("page model: expected at most 65536 values, ascending");

@@ -12,8 +12,8 @@
 
 namespace voxkit::page {
 
-/// The largest error bound: residuals of 32-bit samples stay within 64 bits.
-inline constexpr uint32_t most_error = 0x7fffffff;
+/// The largest error bound: a prediction and 2^31 steps, which damaged pages may have, are within 64 bits.
+inline constexpr uint32_t most_error = 0x7ffffffe;
 
 /// Entries of a palette.
 inline constexpr size_t most_palette = 65536;

@@ -50,7 +50,7 @@ struct Parent {
 };
 
 struct ModelOptions {
-  /// No decoded sample is further from its original than this; 0: all are equal. At most 2^31 - 1.
+  /// No decoded sample is further from its original than this; 0: all are equal. At most 2^31 - 2.
   uint32_t max_error = 0;
   /// The greatest sample that any page will have, if the type of the samples could hold more.
   uint32_t max_sample = 0xffffffff;

@@ -372,8 +372,8 @@ Result<PackedParams> encode_packed(VolumeSource& source, const PackedOptions& op
   if (!(options.max_error >= 0 && options.max_error <= 1e300))
     return bad_usage(fmt::format("--max-error {}: expected a finite bound, 0 or more", options.max_error));
   const bool floats = info.format == VoxelFormat::float32;
-  if (options.max_error >= (floats ? 1e300 : 0x1p31))
-    return bad_usage(fmt::format("--max-error {}: expected less than 2^31", options.max_error));
+  if (options.max_error >= (floats ? 1e300 : 0x1p31 - 1))
+    return bad_usage(fmt::format("--max-error {}: expected less than 2^31 - 1", options.max_error));
   if (options.max_error > 0 && (info.is_labels || info.labels))
     return bad_usage(
         "labels have no values between them: expected a bound of 0 (--max-error 0 or --quality 100)");

@@ -300,7 +300,7 @@ TEST(Packed, WhatIsNotHeldIsRefused) {
   refused(VoxelFormat::rgba32, {}, "RGBA32");
   refused(VoxelFormat::density8, {.page_side = 12}, "8 or 16");
   refused(VoxelFormat::density8, {.max_error = NAN}, "finite");
-  refused(VoxelFormat::density16, {.max_error = 3e9}, "2^31");
+  refused(VoxelFormat::density16, {.max_error = 0x1p31 - 1}, "2^31 - 1");
   refused(VoxelFormat::density8, {.max_error = 1}, "labels", true);
 }
 
