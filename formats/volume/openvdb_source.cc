@@ -246,7 +246,8 @@ class VdbSource final : public VdbVolume {
       each_value([&](double value, bool) {
         info.rounded |= static_cast<double>(static_cast<float>(value)) != value && value == value;
       });
-      if (info.rounded) ctx.note(path + ": 64-bit floats are rounded to 32 bits; those beyond 3.4e38 become infinite");
+      if (info.rounded)
+        ctx.note(path + ": 64-bit floats are rounded to 32 bits; those beyond 3.4e38 become infinite");
     } else if constexpr (std::is_integral_v<Value>) {
       info.sample_type = sizeof(Value) == 4 ? SampleType::i32 : SampleType::i64;
       // One of each value stands for all; of more than a table holds, these and the ends.
