@@ -4,7 +4,7 @@
     packed_decode.py FILE.svmm OUT.raw [--level N]    write the voxels of level N (default 0), x fastest
     packed_decode.py --info FILE.svmm                 print what the headers say as JSON
 
-It is meant to be read and to be trusted, not to be fast: some thirty thousand voxels a second. Section numbers are those
+It is meant to be read and to be trusted, not to be fast: some ten thousand voxels a second. Section numbers are those
 of FORMAT.md. Exit codes: 0 done, 2 usage, 3 the file is unreadable, corrupt or unsupported, 4 cannot write, 5 too large.
 """
 
