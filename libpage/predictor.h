@@ -1,4 +1,4 @@
-// Prediction: a weighted mean of the 16 neighbours that come before a voxel, and of 7 voxels of the coarser
+// Prediction: a weighted mean of the 16 neighbours that come before a voxel, and of 14 voxels of the coarser
 // level where that is known, with weights for each class of voxels that have the same of these in their page.
 #pragma once
 
@@ -15,9 +15,10 @@ namespace voxkit::page {
 /// outside the page, the first.
 inline constexpr int causal_taps = 16;
 inline constexpr int left_tap = 12, second_left_tap = 13, second_above_tap = 14, second_behind_tap = 15;
-/// Of models with parents, 16: the parent, which is the voxel of the coarser level that stands for the voxel
-/// and those beside it; 17 and 18, 19 and 20, 21 and 22: the voxel before and behind that along x, y, z, or
-/// where that is outside the page of parents, the nearest inside.
+/// Of models with parents, 17: the parent, which is the voxel of the coarser level that stands for the voxel
+/// and those beside it; 16 and 18: before and behind that along x; 19..21, 22..24, 25..27: the same next to
+/// these, on the voxel's side, along y, z, both; 28, 29: next to the parent on the other side along y, z.
+/// Where that is outside the page of parents, the nearest inside.
 inline constexpr int parent_tap = 16;
 inline constexpr int tap_count = 30;
 inline constexpr int taps_of(bool parents) {

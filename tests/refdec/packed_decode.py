@@ -4,7 +4,7 @@
     packed_decode.py FILE.svmm OUT.raw [--level N]    write the voxels of level N (default 0), x fastest
     packed_decode.py --info FILE.svmm                 print what the headers say as JSON
 
-It is meant to be read and to be trusted, not to be fast: some thirty thousand voxels a second. Section numbers are those
+It is meant to be read and to be trusted, not to be fast: some ten thousand voxels a second. Section numbers are those
 of FORMAT.md. Exit codes: 0 done, 2 usage, 3 the file is unreadable, corrupt or unsupported, 4 cannot write, 5 too large.
 """
 
@@ -54,7 +54,12 @@ class Packed:
         require(self.codes != STEPS or math.isfinite(self.lo) and 0 < self.step < math.inf,
                 "chunk PAKP: byte {}: steps of {} from {}", at + 8, self.step, self.lo)
         self.check_chunks()
-        self.models = [self.read_model(i) for i in range(min(self.count, 2))]
+        self.models = []  # of each level
+        for level in range(self.count):
+            own = (b"MODL", level, 0) in container.chunks
+            self.models.append(self.read_model(level) if own else self.models[-1])
+        require(not self.models[-1].parents, "chunks MODL: the model of level {} has parents", self.count - 1)
+        self.known = {}  # levels that were decoded, as codes
 
     def dims(self, level):
         return tuple(divide_up(d, 1 << level) for d in self.volume.dims)
@@ -68,9 +73,8 @@ class Packed:
 
     def check_chunks(self):
         unused = {key for key in self.container.chunks if key[0] in (b"MODL", b"PAGE")}
-        for i in range(min(self.count, 2)):
-            require((b"MODL", i, 0) in unused, "chunk table: chunk MODL {} is missing", i)
-            unused.remove((b"MODL", i, 0))
+        require((b"MODL", 0, 0) in unused, "chunk table: chunk MODL 0 is missing")
+        unused -= {(b"MODL", level, 0) for level in range(self.count)}
         for level in range(self.count):
             parts = divide_up(math.prod(self.pages(level)), self.part_pages())
             require(parts <= len(unused), "chunk table: level {}: parts of chunk PAGE are missing", level)
@@ -109,6 +113,30 @@ class Packed:
         require(at == len(data), where + "lengths of pages that do not add up")
         return pages
 
+    def codes_of(self, level):
+        """Of each page of a level: its corner, its shape and its codes."""
+        if level in self.known:
+            return self.known[level]
+        dims, grid, side, model = self.dims(level), self.pages(level), self.side, self.models[level]
+        if model.parents:
+            above, above_grid = self.codes_of(level + 1), self.pages(level + 1)
+        out = []
+        for part in range(divide_up(math.prod(grid), self.part_pages())):
+            for page in self.read_part(level, part):
+                x, y, z = len(out) % grid[0], len(out) // grid[0] % grid[1], len(out) // (grid[0] * grid[1])
+                corner = side * x, side * y, side * z
+                shape = tuple(min(side, d - c) for c, d in zip(corner, dims))
+                parents = None
+                if model.parents:
+                    _, parents_shape, parents = above[(z // 2 * above_grid[1] + y // 2) * above_grid[0] + x // 2]
+                    parents = parents, parents_shape, tuple(i % 2 * side // 2 for i in (x, y, z))
+                try:
+                    out.append((corner, shape, decode_page(model, page, shape, parents)))
+                except Refused as error:
+                    raise Refused("level {}, page at {}: {}".format(level, corner, error)) from None
+        self.known[level] = out
+        return out
+
     def stored(self, code):
         """The bytes of a voxel."""
         if self.codes == INTEGERS:
@@ -123,25 +151,16 @@ class Packed:
 
 def decode(packed, level):
     """The voxels of a level."""
-    dims, grid, side = packed.dims(level), packed.pages(level), packed.side
-    model, size = packed.models[min(level, 1)], packed.volume.voxel_bytes
+    dims, size = packed.dims(level), packed.volume.voxel_bytes
     out, known = bytearray(math.prod(dims) * size), {}
-    for part in range(divide_up(math.prod(grid), packed.part_pages())):
-        for i, page in enumerate(packed.read_part(level, part)):
-            number = part * packed.part_pages() + i
-            corner = tuple(side * n for n in (number % grid[0], number // grid[0] % grid[1], number // (grid[0] * grid[1])))
-            shape = tuple(min(side, d - c) for c, d in zip(corner, dims))
-            try:
-                samples = decode_page(model, page, shape)
-            except Refused as error:
-                raise Refused("level {}, page at {}: {}".format(level, corner, error)) from None
-            for code in set(samples) - known.keys():
-                known[code] = packed.stored(code)
-            for row in range(shape[1] * shape[2]):
-                y, z = corner[1] + row % shape[1], corner[2] + row // shape[1]
-                at = ((z * dims[1] + y) * dims[0] + corner[0]) * size
-                voxels = b"".join(known[code] for code in samples[row * shape[0]:(row + 1) * shape[0]])
-                out[at:at + len(voxels)] = voxels
+    for corner, shape, codes in packed.codes_of(level):
+        for code in set(codes) - known.keys():
+            known[code] = packed.stored(code)
+        for row in range(shape[1] * shape[2]):
+            y, z = corner[1] + row % shape[1], corner[2] + row // shape[1]
+            at = ((z * dims[1] + y) * dims[0] + corner[0]) * size
+            voxels = b"".join(known[code] for code in codes[row * shape[0]:(row + 1) * shape[0]])
+            out[at:at + len(voxels)] = voxels
     return out
 
 

@@ -1,5 +1,6 @@
 """Pages and their models, from section 5 of formats/FORMAT.md alone. For packed_decode.py beside this file."""
 
+from bisect import bisect_left
 from functools import lru_cache
 
 from container import require
@@ -8,7 +9,7 @@ TAPS = ([(t % 3 - 1, t // 3 - 1, -1) for t in range(9)] + [(t - 10, -1, 0) for t
         [(-1, 0, 0), (-2, 0, 0), (0, -2, 0), (0, 0, -2)])
 THRESHOLDS = (1, 2, 3, 4, 5, 6, 7, 8, 11, 15, 20, 27, 37, 49, 67, 90, 122, 164, 222, 299, 404, 546, 737)
 MOST = THRESHOLDS[-1]
-CONTEXTS = [sum(t <= a for t in THRESHOLDS) for a in range(MOST + 2 * 255 + 1)]  # of an activity, without 24 and 48
+CONTEXTS = [sum(t <= a for t in THRESHOLDS) for a in range(MOST + 2 * 255 + 1)]  # of an activity, in its 24
 ESCAPE = 72
 
 
@@ -40,25 +41,35 @@ class Bits:
         return -(g + 1) // 2 if g % 2 else g // 2
 
 
-def lacks(c, tap):
+def counts(parents):
+    """Of classes, taps and tables."""
+    return (48, 30, 192) if parents else (18, 16, 72)
+
+
+def lacks(c, tap, parents=False):
     """Whether a class of voxels lacks a tap."""
+    if tap >= 16:
+        return not parents
     dx, dy, dz = TAPS[tap]
-    px, py = c % 3, c // 3 % 3
-    return ((dx < 0 and px == 0) or (dx > 0 and px == 2) or (dy < 0 and py == 0) or (dy > 0 and py == 2) or
-            (dz < 0 and c < 9))
+    n = 4 if parents else 3
+    px, py = c % n, c // n % n
+    return ((dx < 0 and px == 0) or (dx > 0 and px == n - 1) or (dy < 0 and py == 0) or (dy > 0 and py == n - 1) or
+            (dz < 0 and c < n * n))
 
 
-def rest_tap(c):
-    return next((t for t in (4, 10, 12) if not lacks(c, t)), None)
+def rest_tap(c, parents=False):
+    return next((t for t in (17, 4, 10, 12) if not lacks(c, t, parents)), None)
 
 
 class Model:
     def __init__(self, data):
         bits = Bits(data)
-        require(bits.get(8) == 1, "page model: unknown version")
+        version = bits.get(8)
+        require(version in (1, 2), "page model: unknown version {}", version)
+        self.parents = version == 2
         self.has_palette = bits.get(1)
         self.most, self.bound, self.background = bits.get(32), bits.golomb(0), bits.golomb(8)
-        require(self.bound < 1 << 31, "page model: bound {}", self.bound)
+        require(self.bound <= (1 << 31) - 2, "page model: bound {}", self.bound)
         require(self.background <= self.most, "page model: background {} above {}", self.background, self.most)
         self.palette = None
         if self.has_palette:
@@ -72,9 +83,10 @@ class Model:
         self.greatest_sample = self.palette[-1] if self.has_palette else self.most
         self.wide = self.most >= 1 << 16
         self.value_bytes = 1 if self.most < 1 << 8 else 2 if self.most < 1 << 16 else 4
-        self.weights = [self.read_weights(bits, c) for c in range(18)]
+        classes, _, tables = counts(self.parents)
+        self.weights = [self.read_weights(bits, c, self.parents) for c in range(classes)]
         self.tables = []
-        for context in range(72):
+        for context in range(tables):
             same = bits.get(1)
             require(not same or context > 0, "page model: the first table is as the one before")
             self.tables.append(self.tables[-1] if same else self.read_table(bits))
@@ -82,11 +94,21 @@ class Model:
         require(bits.get(8 * used - bits.at) == 0 and used == len(data), "page model: bits behind its end")
         self.palette = self.palette or range(self.most + 1)
 
+    def nearest(self, sample):
+        """The value that a parent has."""
+        if not self.has_palette:
+            return min(sample, self.most)
+        above = bisect_left(self.palette, sample)
+        if above == 0 or above > self.most:
+            return min(above, self.most)
+        return above - 1 if sample - self.palette[above - 1] <= self.palette[above] - sample else above
+
     @staticmethod
-    def read_weights(bits, c):
+    def read_weights(bits, c, parents):
         """Pairs of taps and weights."""
-        rest = rest_tap(c)
-        weights = {t: bits.signed_golomb(7) for t in range(16) if not lacks(c, t) and t != rest}
+        rest = rest_tap(c, parents)
+        taps = range(counts(parents)[1])
+        weights = {t: bits.signed_golomb(7) for t in taps if not lacks(c, t, parents) and t != rest}
         if rest is not None:
             weights[rest] = 4096 - sum(weights.values())
         require(all(-32767 <= w <= 32767 for w in weights.values()) and sum(map(abs, weights.values())) <= 65535,
@@ -154,37 +176,59 @@ class State:
         return base
 
 
-@lru_cache(maxsize=64)
-def places(shape):
-    """Of each voxel of a page of this shape, in order: its class, where its taps are, which of these its range is
-    of, where its activity comes from (eight times), the voxel before (None if it has none), and 0, 24 or 48."""
+@lru_cache(maxsize=256)
+def places(shape, parents):
+    """Of each voxel of a page of this shape, in order: its class, where its taps are, of which sets of values its range
+    is, where its activity comes from (eight times), the voxel before (None if it has none), and its first table.
+    `parents`: None, or the shape of their page and where in it those of the page begin; they stand before the voxels."""
     X, Y, Z = shape
+    skip = parents[0][0] * parents[0][1] * parents[0][2] if parents else 0
+
+    def index(point, shape):
+        x, y, z = (min(max(i, 0), n - 1) for i, n in zip(point, shape))
+        return (z * shape[1] + y) * shape[0] + x
 
     def at(x, y, z):
-        x, y, z = (min(max(i, 0), n - 1) for i, n in zip((x, y, z), shape))
-        return (z * Y + y) * X + x
+        return skip + index((x, y, z), shape)
 
     def place(i, n):
+        if parents:
+            return 0 if i == 0 else 3 if i == n - 1 else 1 + i % 2
         return 0 if i == 0 else 2 if i == n - 1 else 1
+
+    def parent(voxel, *distance):
+        return index([c + i // 2 + d for c, i, d in zip(parents[1], voxel, distance)], parents[0])
 
     out = []
     for z in range(Z):
         for y in range(Y):
             u = (y - 1, z) if y > 0 else (y, z - 1)
             b = (y, z - 1) if z > 0 else (y - 1, z)
+            ty, tz = 2 * (y % 2) - 1, 2 * (z % 2) - 1
             for x in range(X):
                 taps = [at(x + dx, y + dy, z + dz) for dx, dy, dz in TAPS]
-                span, near = (), ()
+                spans, near = [], ()
                 if y > 0 or z > 0:
-                    span = taps[0 if z > 0 else 9:12 if y > 0 else 9]
+                    spans = [taps[0 if z > 0 else 9:12 if y > 0 else 9]]
                     near = tuple(at(x + dx, *row) for row in (u, b) for dx in (-1, 0, 0, 1))
-                out.append((place(x, X) + 3 * place(y, Y) + (9 if z > 0 else 0), taps, span, near,
-                            at(x - 1, y, z) if x > 0 else None, 0 if z == 0 else 24 if y == 0 else 48))
+                if parents:
+                    own = parent((x, y, z), 0, 0, 0)
+                    taps += [parent((x, y, z), dx, dy, dz) for dz in (0, tz) for dy in (0, ty) for dx in (-1, 0, 1)]
+                    taps += [parent((x, y, z), 0, -ty, 0), parent((x, y, z), 0, 0, -tz)]
+                    around = [(1, 0, 0), (-1, 0, 0), (0, 1, 0), (0, -1, 0), (0, 0, 1), (0, 0, -1)]
+                    spans = [(spans[0] if spans else []) + [own], [own] + [parent((x, y, z), *d) for d in around]]
+                    c = place(x, X) + 4 * place(y, Y) + 16 * (0 if z == 0 else 1 + z % 2)
+                    first = 24 * (4 * (z % 2) + 2 * (y % 2) + x % 2)
+                else:
+                    c = place(x, X) + 3 * place(y, Y) + (9 if z > 0 else 0)
+                    first = 0 if z == 0 else 24 if y == 0 else 48
+                out.append((c, taps, spans, near, at(x - 1, y, z) if x > 0 else None, first))
     return out
 
 
-def decode_page(model, page, shape):
-    """The samples of a page of `shape` voxels, x fastest."""
+def decode_page(model, page, shape, parents=None):
+    """The samples of a page of `shape` voxels, x fastest. `parents`, of a model that has them: the samples of their page,
+    its shape, and where in it those of this page begin."""
     count = shape[0] * shape[1] * shape[2]
     if len(page) <= model.value_bytes:
         require(len(page) in (0, model.value_bytes), "page: {} bytes, expected {}", len(page), model.value_bytes)
@@ -192,29 +236,29 @@ def decode_page(model, page, shape):
         require(value <= model.most, "page: value {} above {}", value, model.most)
         return [model.palette[value]] * count
 
-    state, values, magnitudes = State(page), [], []
+    # Parents, then the voxels of the page.
+    values = [model.nearest(sample) for sample in parents[0]] if model.parents else []
+    skip, state, magnitudes = len(values), State(page), [0] * len(values)
     step = 2 * model.bound + 1
-    for c, taps, span, near, left, rows in places(shape):
+    for c, taps, spans, near, left, table in places(shape, parents[1:] if model.parents else None):
+        first = not values  # of all, without parents
         # 1. Prediction.
-        if values:
-            total = sum(weight * values[taps[t]] for t, weight in model.weights[c])
-        else:
-            total = 4096 * model.background
+        total = 4096 * model.background if first else sum(weight * values[taps[t]] for t, weight in model.weights[c])
         predicted = min(max((total + 2047) // 4096, 0), model.most)
         mirrored = (total + 2047) % 4096 >= 2048
         # 2. Context.
-        if near:
+        shares = 0
+        for span in spans:
             around = [values[at] for at in span]
-            activity = sum(magnitudes[at] for at in near) + ((max(around) - min(around)) * (32768 // step) >> 16)
-            activity = min(activity, MOST)
-            if left is None:
-                activity = min(activity + 2 * magnitudes[near[1]], MOST)
-        else:
-            activity = 0 if values else MOST
+            shares += min((max(around) - min(around)) * (32768 // step) >> 16, 1023)
+        activity = sum([magnitudes[at] for at in near]) + shares // max(len(spans), 1)
+        activity = MOST if first else min(activity, MOST)
         if left is not None:
             activity += 2 * magnitudes[left]
+        elif near:
+            activity = min(activity + 2 * magnitudes[near[1]], MOST)
         # 3. Symbol.
-        folded = state.folded(model.tables[CONTEXTS[activity] + rows], model.wide)
+        folded = state.folded(model.tables[CONTEXTS[activity] + table], model.wide)
         # 4. Value.
         size = (folded + 1) // 2
         value = predicted + (-size if folded % 2 != mirrored else size) * step
@@ -223,4 +267,4 @@ def decode_page(model, page, shape):
         values.append(min(max(value, 0), model.most))
         magnitudes.append(min(size, 255))
     require(state.value == 1 and not state.words, "page: it does not end where its voxels end")
-    return [model.palette[value] for value in values]
+    return [model.palette[value] for value in values[skip:]]
