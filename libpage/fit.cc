@@ -167,8 +167,9 @@ Weights Fit::solve(const Equations& equations, int voxel_class) const {
   if (n == 0 || equations.weight == 0) return weights;
 
   // Differences that hardly occur have no weight. Where weights are too large for their bits, as that of the
-  // parent of noise may be, all are held back more.
-  for (double damping = 1.0 / 4096; damping < 1; damping *= 4) {
+  // parent of noise may be, all are held back more; without parents, such are of no use.
+  const double most_damping = classes_.parents ? 1 : 1.0 / 4096;
+  for (double damping = 1.0 / 4096; damping <= most_damping; damping *= 4) {
     std::array<Row, tap_count> a;
     Row b;
     for (size_t i = 0; i < n; ++i) {
