@@ -79,8 +79,8 @@ def smaller(rows):
 
 
 CONDITIONS = [
-    (r"it makes scans much smaller than `svmm-encode`; `--max-error` makes them smaller still, and k-means,", smaller),
-    (r"the smaller one for scans, without loss or within a bound", smaller_for_scans),
+    (r"it makes scans much smaller than sparse mip-maps do; `--max-error` makes them smaller still, and k-means,", smaller),
+    (r"makes scans much smaller than sparse mip-maps do", smaller_for_scans),
 ]
 
 
