@@ -2,7 +2,9 @@
 // decodable alone (libpage). File: formats/FORMAT.md, section 2.6.
 //
 // Level 0 is the volume; each voxel of level l + 1 stands for 2^3 voxels of level l: their mean, without
-// those that stand for nothing measured; of labels the commonest. The last level fits into one page.
+// those that stand for nothing measured; of labels the commonest. The last level fits into one page. Each
+// page is predicted from the one page of the next coarser level that its voxels are part of, too, so that
+// levels cost little, and decoding a page takes one page of each coarser level.
 #pragma once
 
 #include <memory>
@@ -18,7 +20,8 @@ namespace voxkit::svmm {
 
 struct PackedOptions {
   /// No decoded voxel of level 0 is further from its original than this, nor one of another level from the
-  /// mean it stands for; in units of samples. 0: all are equal.
+  /// mean it stands for; in units of samples. 0: all are equal. Only where all integers that there are lie
+  /// apart, means may be as far from what they become as half of that distance, or a 43rd of the range.
   double max_error = 0;
   bool levels = true;  ///< whether there are levels above 0
   int page_side = 16;  ///< 16 or 8 voxels
@@ -66,7 +69,8 @@ class PackedVolume {
   const std::vector<PackedLevel>& levels() const { return levels_; }
   const Container& container() const { return *container_; }
 
-  /// Decodes `box`, in voxels of `level` and inside its dims: only the pages that it touches.
+  /// Decodes `box`, in voxels of `level` and inside its dims: only the pages that it touches, and of coarser
+  /// levels those that these are predicted from, as far as they are not kept.
   Status decode(const Box& box, int level, VoxelSpan out) const;
   /// One voxel, through a cache of decoded pages.
   Result<Voxel> sample(Index3 voxel, int level = 0) const;
@@ -74,7 +78,7 @@ class PackedVolume {
   std::optional<Voxel> uniform(const Box& box, int level) const;
   /// Verifies every checksum and decodes every page. Errors name level and page.
   Status check(Context& ctx) const;
-  /// Pages that were decoded so far.
+  /// Pages that were decoded so far, of all levels.
   uint64_t pages_decoded() const;
 
  private:
