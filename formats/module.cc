@@ -19,10 +19,8 @@ std::string loader_error() {
   return line;
 }
 
-/// Whether there is room for what loading a module maps. The libraries behind OpenImageIO and OpenVDB start
-/// a thread for each core as they are loaded (log4cplus), and wait for ever where one of these cannot be had.
-bool room_for(const std::string& module) {
-  if (module != "image_stack" && module != "openvdb") return true;
+/// Whether there is address space for what a module maps that starts threads.
+bool room_for_threads() {
   constexpr size_t libraries = size_t{500} << 20, thread = size_t{16} << 20;
   const size_t bytes = libraries + thread * std::thread::hardware_concurrency();
   void* const probe = mmap(nullptr, bytes, PROT_NONE, MAP_PRIVATE | MAP_ANONYMOUS | MAP_NORESERVE, -1, 0);
@@ -49,7 +47,7 @@ Result<const ModuleTable*> load_module(const std::string& folder, const ModuleNe
                             need.package));
   if (void* const loaded = dlopen(path.c_str(), RTLD_NOW | RTLD_NOLOAD); loaded)
     dlclose(loaded);
-  else if (!room_for(need.module))
+  else if (need.starts_threads && !room_for_threads())
     return fail(
         ErrorCode::limit, {},
         fmt::format("the {} module needs more address space than this process may have", need.module));

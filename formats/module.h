@@ -35,6 +35,10 @@ struct ModuleNeed {
   std::string action;                    ///< "reading .vdb files"
   std::string package;                   ///< "libopenvdb-dev"
   ErrorCode missing = ErrorCode::input;  ///< code of the error when it is missing
+  /// Whether its libraries start a thread for each core as they are loaded, as log4cplus behind OpenImageIO
+  /// and OpenVDB does, which waits for ever where one cannot be had: then it is refused (ErrorCode::limit)
+  /// where there is no address space for 500 MB and 16 MB a core.
+  bool starts_threads = false;
 };
 
 /// The table of the module in `folder`, which is loaded at the first call and never unloaded. Fails with

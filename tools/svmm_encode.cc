@@ -134,6 +134,26 @@ Result<bool> holds(std::unique_ptr<VolumeSource>& source, Inputs& inputs, const 
   return false;
 }
 
+/// Full scale: what --range says, or else, unless nothing depends on it, what is measured. A value of floats
+/// that stands for nothing is looked for on the way.
+Result<double> scale_of(const Options& o, bool lossless, std::unique_ptr<VolumeSource>& source,
+                        Inputs& inputs, Run& run) {
+  if (o.range) return o.range->hi - o.range->lo;
+  ValueRange range{0, 1};
+  const VoxelFormat format = source->info().format;
+  if (!lossless && format == VoxelFormat::float32) {
+    VOX_TRY(const Census census, look_at_floats(source, inputs, o.input, run));
+    range = census.range;
+  } else if (!lossless && !o.max_error && format == VoxelFormat::density16) {
+    run.stage("measure");
+    VOX_TRY(range, measure_range(*source, run.ctx));
+    if (source->forward_only()) {
+      VOX_TRY(source, inputs.open(true));
+    }
+  }
+  return full_scale(source->info(), range);
+}
+
 Status check_packed(const Options& o) {
   if (o.blockwidths != std::vector<int64_t>{0} || o.rootwidth != 32 || o.base != "raw" || !o.bound.empty() ||
       !o.alpha_weight.empty() || o.zstd != 0)
@@ -157,21 +177,8 @@ Result<int> work_packed(const Options& o, Inputs& inputs, Run& run) {
   const double delta =
       o.delta ? *o.delta : svmm::delta_of_quality(o.quality.value_or(90), format, svmm::Layout::plain);
   const bool lossless = o.max_error ? *o.max_error == 0 : delta == 0;
-  if (!lossless && format == VoxelFormat::float32) {
-    VOX_TRY(const Census census, look_at_floats(source, inputs, o.input, run));
-    options.max_error = o.max_error.value_or(delta * full_scale(source->info(), census.range));
-    if (o.range && !o.max_error) options.max_error = delta * (o.range->hi - o.range->lo);
-  } else if (!lossless && !o.max_error && format == VoxelFormat::density16 && !o.range) {
-    run.stage("measure");
-    VOX_TRY(const ValueRange range, measure_range(*source, run.ctx));
-    if (source->forward_only()) {
-      VOX_TRY(source, inputs.open(true));
-    }
-    options.max_error = delta * full_scale(source->info(), range);
-  } else if (!lossless) {
-    options.max_error = o.max_error.value_or(
-        delta * (o.range ? o.range->hi - o.range->lo : full_scale(source->info(), {0, 1})));
-  }
+  VOX_TRY(const double scale, scale_of(o, lossless, source, inputs, run));
+  options.max_error = o.max_error.value_or(delta * scale);
   const VolumeInfo info = source->info();
   run.stage("read");
   VOX_TRY(source, spooled(std::move(source), run.ctx));
@@ -221,20 +228,8 @@ Result<int> work(const Options& o, Run& run) {
   if (o.range && format != VoxelFormat::density16 && format != VoxelFormat::float32)
     return bad_usage(fmt::format(
         "--range: {} voxels have a full scale of their own: expected 16 bit or float voxels", name(format)));
-  ValueRange range{0, 1};
-  if (!lossless && !o.range && source->info().format == VoxelFormat::float32) {
-    VOX_TRY(const Census census, look_at_floats(source, inputs, o.input, run));
-    range = census.range;
-  }
+  VOX_TRY(params.full_scale, scale_of(o, lossless, source, inputs, run));
   const VolumeInfo info = source->info();
-  if (!o.range && !lossless && info.format == VoxelFormat::density16) {
-    run.stage("measure");
-    VOX_TRY(range, measure_range(*source, run.ctx));
-    if (source->forward_only()) {
-      VOX_TRY(source, inputs.open(true));
-    }
-  }
-  params.full_scale = o.range ? o.range->hi - o.range->lo : full_scale(info, range);
 
   VOX_TRY(auto out, OutputFile::create(o.output, run.options.force));
   run.stage("encode");

@@ -43,14 +43,14 @@ Status check_image_output(const std::string& path, bool force) {
 
 Result<std::optional<Image>> read_image(const std::string& path, Context& ctx) {
   VOX_TRY(const ModuleTable* const module,
-          load_module({"image_stack", "reading images", "libopenimageio-dev"}, path));
+          load_module({"image_stack", "reading images", "libopenimageio-dev", ErrorCode::input, true}, path));
   return module->image->read(path, ctx);
 }
 
 Status write_image(const std::string& path, const Image& image, bool force,
                    std::span<const ImageLayer> layers) {
   VOX_TRY(const ModuleTable* const module,
-          load_module({"image_stack", "writing images", "libopenimageio-dev", ErrorCode::usage}, path));
+          load_module({"image_stack", "writing images", "libopenimageio-dev", ErrorCode::usage, true}, path));
   return module->image->write(path, image, force, layers);
 }
 

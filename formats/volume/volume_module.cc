@@ -4,10 +4,11 @@
 namespace voxkit {
 namespace {
 
-const ModuleNeed read_images{"image_stack", "reading image stacks", "libopenimageio-dev"},
-    write_images{"image_stack", "writing image stacks", "libopenimageio-dev", ErrorCode::usage},
-    read_vdb{"openvdb", "reading .vdb files", "libopenvdb-dev"},
-    write_vdb{"openvdb", "writing .vdb files", "libopenvdb-dev", ErrorCode::usage},
+const ModuleNeed read_images{"image_stack", "reading image stacks", "libopenimageio-dev", ErrorCode::input,
+                             true},
+    write_images{"image_stack", "writing image stacks", "libopenimageio-dev", ErrorCode::usage, true},
+    read_vdb{"openvdb", "reading .vdb files", "libopenvdb-dev", ErrorCode::input, true},
+    write_vdb{"openvdb", "writing .vdb files", "libopenvdb-dev", ErrorCode::usage, true},
     read_dicom{"dicom", "reading DICOM slices", "libgdcm-dev"};
 
 }  // namespace

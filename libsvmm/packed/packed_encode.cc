@@ -146,7 +146,8 @@ class Encoder {
         survey_(info_.format),
         container_(sink, Codec::svmm, container_version_for(info_), 0, *ctx.memory) {
     params_.page_side = options.page_side;
-    params_.max_error = options.max_error;
+    const bool floats = info_.format == VoxelFormat::float32;
+    params_.max_error = floats ? options.max_error : std::floor(options.max_error);
     params_.levels = options.levels ? level_count(info_.dims, options.page_side) : 1;
   }
 
@@ -188,7 +189,7 @@ class Encoder {
     }
     if (info_.format == VoxelFormat::float32) {
       VOX_CHECK(choose_map());
-    } else if (params_.max_error < 1 && !info_.is_labels && !info_.fill) {
+    } else if (params_.max_error == 0 && !info_.is_labels && !info_.fill) {
       raster_ = Raster(survey_.values());
     }
     return {};

@@ -159,6 +159,8 @@ Result<std::shared_ptr<const PackedVolume>> PackedVolume::open(std::shared_ptr<c
   return std::shared_ptr<const PackedVolume>(volume);
 }
 
+namespace {
+
 /// The coarser pages that were last used: pages that lie together mostly have the same.
 using Ancestors = std::array<std::pair<uint64_t, std::shared_ptr<const PageCache::Page>>, max_packed_levels>;
 
@@ -262,18 +264,6 @@ Status decode_box(const Container& container, const PackedVolume& volume, const 
   return waiting > 0 ? flush() : Status();
 }
 
-Status PackedVolume::decode(const Box& box, int level, VoxelSpan out) const {
-  if (box.empty()) return {};
-  switch (code_bytes(info_.format)) {
-    case 4:
-      return decode_box<uint32_t>(*container_, *this, *pages_, box, level, out);
-    case 2:
-      return decode_box<uint16_t>(*container_, *this, *pages_, box, level, out);
-    default:
-      return decode_box<uint8_t>(*container_, *this, *pages_, box, level, out);
-  }
-}
-
 template <class T>
 Result<Voxel> sample_of(const Container& container, const PackedVolume& volume, const auto& pages,
                         Index3 voxel, int level) {
@@ -290,6 +280,20 @@ Result<Voxel> sample_of(const Container& container, const PackedVolume& volume, 
     return Voxel::of(volume.params().map.value(code));
   else
     return Voxel::of(code);
+}
+
+}  // namespace
+
+Status PackedVolume::decode(const Box& box, int level, VoxelSpan out) const {
+  if (box.empty()) return {};
+  switch (code_bytes(info_.format)) {
+    case 4:
+      return decode_box<uint32_t>(*container_, *this, *pages_, box, level, out);
+    case 2:
+      return decode_box<uint16_t>(*container_, *this, *pages_, box, level, out);
+    default:
+      return decode_box<uint8_t>(*container_, *this, *pages_, box, level, out);
+  }
 }
 
 Result<Voxel> PackedVolume::sample(Index3 voxel, int level) const {

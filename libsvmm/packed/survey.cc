@@ -9,11 +9,13 @@ namespace voxkit::svmm {
 namespace {
 
 template <class T>
-void mark(ConstVoxelSpan voxels, Index3 size, std::vector<uint8_t>& seen) {
+void mark(ConstVoxelSpan voxels, Index3 size, std::atomic<uint8_t>* seen) {
   for (int64_t z = 0; z < size.z; ++z)
     for (int64_t y = 0; y < size.y; ++y) {
       const auto* const row = reinterpret_cast<const T*>(voxels.row(y, z));
-      for (int64_t x = 0; x < size.x; ++x) seen[row[x]] = 1;
+      for (int64_t x = 0; x < size.x; ++x)
+        if (std::atomic<uint8_t>& mark = seen[row[x]]; mark.load(std::memory_order_relaxed) == 0)
+          mark.store(1, std::memory_order_relaxed);
     }
 }
 
@@ -55,16 +57,17 @@ ValueRange range_of(ConstVoxelSpan voxels, Index3 size) {
 }  // namespace
 
 Survey::Survey(VoxelFormat format) : format_(format) {
-  if (format != VoxelFormat::float32) seen_.resize(size_t{1} << 8 * voxel_bytes(format));
+  if (format == VoxelFormat::float32) return;
+  values_ = size_t{1} << 8 * voxel_bytes(format);
+  seen_ = std::make_unique<std::atomic<uint8_t>[]>(values_);
 }
 
 void Survey::look(ConstVoxelSpan voxels, Index3 size) {
   if (format_ != VoxelFormat::float32) {
-    std::vector<uint8_t> seen(seen_.size());
-    format_ == VoxelFormat::density16 ? mark<uint16_t>(voxels, size, seen)
-                                      : mark<uint8_t>(voxels, size, seen);
-    const std::lock_guard lock(mutex_);
-    for (size_t i = 0; i < seen.size(); ++i) seen_[i] |= seen[i];
+    if (format_ == VoxelFormat::density16)
+      mark<uint16_t>(voxels, size, seen_.get());
+    else
+      mark<uint8_t>(voxels, size, seen_.get());
     return;
   }
   if (!many_floats_) {
@@ -86,7 +89,7 @@ void Survey::look(ConstVoxelSpan voxels, Index3 size) {
 std::vector<uint32_t> Survey::values() const {
   std::vector<uint32_t> values(floats_.begin(), floats_.end());
   std::sort(values.begin(), values.end());
-  for (size_t i = 0; i < seen_.size(); ++i)
+  for (size_t i = 0; i < values_; ++i)
     if (seen_[i]) values.push_back(static_cast<uint32_t>(i));
   return values;
 }

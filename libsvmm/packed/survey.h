@@ -2,6 +2,7 @@
 #pragma once
 
 #include <atomic>
+#include <memory>
 #include <mutex>
 #include <unordered_set>
 #include <vector>
@@ -25,9 +26,10 @@ class Survey {
  private:
   VoxelFormat format_;
   std::mutex mutex_;
-  std::vector<uint8_t> seen_;             ///< by value of integers
-  std::unordered_set<uint32_t> floats_;   ///< codes of floats
-  std::atomic<bool> many_floats_{false};  ///< more than are counted
+  std::unique_ptr<std::atomic<uint8_t>[]> seen_;  ///< by value of integers
+  size_t values_ = 0;                             ///< that integers may have
+  std::unordered_set<uint32_t> floats_;           ///< codes of floats
+  std::atomic<bool> many_floats_{false};          ///< more than are counted
   ValueRange range_{1, 0};
 };
 

@@ -25,6 +25,7 @@ SCALAR, COLOR = "noise:48:1", "menger:3"
 OUTPUTS = {
     "svmm": ("svmm-encode", [SCALAR], "a.svmm"),
     "svmm zstd": ("svmm-encode", [SCALAR, "--zstd", "3"], "a.svmm"),
+    "svmm packed": ("svmm-encode", [SCALAR, "--layout", "packed"], "a.svmm"),
     "vqv": ("vq-encode", [SCALAR], "a.vqv"),
     "dagc": ("dagcolor-pack", ["terrain:64"], "a.dagc"),
     "nrrd": ("vox-convert", [SCALAR], "a.nrrd"),
@@ -51,7 +52,7 @@ OUTPUTS = {
     "report": ("vox-render", ["@/a.svmm", "--size", "200x100", "--path", "orbit:64", "--no-images", "--report"],
                "r.json"),
     "frames": ("vox-render", ["@/a.svmm", "--size", "120x80", "--path", "orbit:4"], "f-%02d.png"),
-    "tf": ("vox-render", ["@/a.svmm", "--mode", "dvr", "--size", "200x100"], "d.png"),
+    "dvr": ("vox-render", ["@/a.svmm", "--mode", "dvr", "--size", "200x100"], "d.png"),
 }
 PIPED = {  # what is written to standard output with -o -
     "svmm": ("svmm-encode", ["noise:100:1"]),

@@ -10,10 +10,11 @@ struct Answer : voxkit::test::Answer {
   std::vector<std::vector<std::byte>> levels;  ///< decoded in full, if all could be
 };
 
-/// A level, or corners of it; whether it was decoded in full.
-inline bool ask_level(const Volume& volume, int level, Answer& answer) {
+/// A level of these dims, of either kind of volume, or corners of it; whether it was decoded in full.
+template <class AnyVolume>
+bool ask_level(const AnyVolume& volume, Index3 dims, int level, Answer& answer) {
   bool whole = true;
-  for (const Box& box : voxkit::test::boxes_of(volume.dims_at(level))) {
+  for (const Box& box : voxkit::test::boxes_of(dims)) {
     std::optional<std::vector<std::byte>> decoded;
     const auto fault = voxkit::test::ask_box(
         volume.info().format, box, decoded,
@@ -24,7 +25,7 @@ inline bool ask_level(const Volume& volume, int level, Answer& answer) {
     if (answer.fault.empty() && answer.checked && !decoded)
       answer.fault = fmt::format("check() finds nothing wrong, but level {} cannot be decoded", level);
     if (!answer.fault.empty()) return false;
-    whole = decoded && box.size() == volume.dims_at(level);
+    whole = decoded && box.size() == dims;
     if (whole) answer.levels.push_back(std::move(*decoded));
   }
   return whole;
@@ -37,7 +38,7 @@ inline Answer attack(std::span<const std::byte> file) {
     for (int level = 0; level < static_cast<int>(volume.levels().size()) && answer.fault.empty(); ++level) {
       const Index3 dims = volume.dims_at(level);
       if (checked_voxels(dims))
-        whole &= ask_level(volume, level, answer);
+        whole &= ask_level(volume, dims, level, answer);
       else
         answer.fault = fmt::format("level {} of {} x {} x {}", level, dims.x, dims.y, dims.z);
     }
