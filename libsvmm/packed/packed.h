@@ -20,8 +20,9 @@ namespace voxkit::svmm {
 
 struct PackedOptions {
   /// No decoded voxel of level 0 is further from its original than this, nor one of another level from the
-  /// mean it stands for; in units of samples. 0: all are equal. Only where all integers that there are lie
-  /// apart, means may be as far from what they become as half of that distance, or a 43rd of the range.
+  /// mean it stands for; in units of samples. 0: all are equal. Only means of 8 bits may be off by 2 in any
+  /// case, and where all integers that there are lie further apart than this bound, means by half of that
+  /// distance, or a 43rd of the range.
   double max_error = 0;
   bool levels = true;  ///< whether there are levels above 0
   int page_side = 16;  ///< 16 or 8 voxels

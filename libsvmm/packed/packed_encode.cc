@@ -24,6 +24,10 @@ namespace {
 /// Pages that a model is fitted to.
 constexpr uint64_t most_samples = 512;
 
+/// How far voxels of coarser levels of 8 bits may be from means: what this saves is more than half of what
+/// levels of clean volumes cost.
+constexpr uint32_t bound_of_coarse_bytes = 2;
+
 /// Reads pages of a level as codes.
 class PageReader {
  public:
@@ -173,6 +177,14 @@ class Encoder {
  private:
   VolumeSource& source(int level) { return level == 0 ? source_ : *coarser_[static_cast<size_t>(level - 1)]; }
   const Raster& raster(int level) const { return level == 0 ? all_values_ : raster_; }
+  /// Of the codes of a level, and of integers of their samples.
+  uint32_t bound(int level) const {
+    if (info_.format == VoxelFormat::float32) return 0;
+    const auto bound = static_cast<uint32_t>(params_.max_error);
+    if (level == 0) return bound;
+    if (!raster_.empty()) return 0;
+    return coarse_bytes_ ? std::max(bound, bound_of_coarse_bytes) : bound;
+  }
   PageGrid grid(int level) { return {source(level).info().dims, params_.page_side}; }
 
   /// The first pass.
@@ -189,8 +201,12 @@ class Encoder {
     }
     if (info_.format == VoxelFormat::float32) {
       VOX_CHECK(choose_map());
-    } else if (params_.max_error == 0 && !info_.is_labels && !info_.fill) {
-      raster_ = Raster(survey_.values());
+    } else if (!info_.is_labels && !info_.fill) {
+      const auto values = survey_.values();
+      Raster raster(values);
+      if (raster.step() > 2 * params_.max_error) raster_ = std::move(raster);
+      coarse_bytes_ =
+          info_.format == VoxelFormat::density8 && !values.empty() && values.back() - values.front() >= 128;
     }
     return {};
   }
@@ -247,13 +263,13 @@ class Encoder {
     if (decoded_ && decoded_->level() == level + 1) return decoded_->parent_of<T>(child);
     const PageGrid above = grid(level + 1);
     const uint64_t parent_number = above.number(child / int64_t{2});
-    const auto bound = info_.format == VoxelFormat::float32 ? 0u : static_cast<uint32_t>(params_.max_error);
-    const uint64_t step = 2 * uint64_t{bound} + 1;
+    const uint32_t bound_above = bound(level + 1);
+    const uint64_t step = 2 * uint64_t{bound_above} + 1;
     VOX_CHECK(PageReader(source(level + 1), above, params_, raster(level + 1))
                   .read(parent_number, parent_number + 1, [&](uint64_t, auto codes, page::Extent) -> Status {
                     for (const auto code : codes)
                       room.push_back(static_cast<T>(
-                          std::min<uint64_t>((code + bound) / step * step, std::numeric_limits<T>::max())));
+                          std::min<uint64_t>((code + bound_above) / step * step, std::numeric_limits<T>::max())));
                     return {};
                   }));
     page::Parent<T> parent = placed<T>(child, above);
@@ -283,7 +299,7 @@ class Encoder {
       options.max_sample = steps ? params_.map.code(static_cast<float>(survey_.range().hi)) : 0xffffffff;
       if (!steps && level == 0) options.values = survey_.values();
     } else {
-      options.max_error = static_cast<uint32_t>(params_.max_error);
+      options.max_error = bound(level);
       const auto values = survey_.values();
       options.max_sample = values.empty() ? 0 : values.back();
       // Means of voxels may be other values.
@@ -354,7 +370,8 @@ class Encoder {
   PackedParams params_;
   Survey survey_;
   const Raster all_values_;
-  Raster raster_;  ///< of coarser levels
+  Raster raster_;              ///< of coarser levels
+  bool coarse_bytes_ = false;  ///< whether these are of 8 bits, and need not be exact
   std::vector<std::unique_ptr<VolumeSource>> coarser_;
   std::unique_ptr<DecodedLevel> decoded_;  ///< the level above that which comes next
   ContainerWriter container_;

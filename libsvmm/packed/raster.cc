@@ -15,6 +15,7 @@ Raster::Raster(std::span<const uint32_t> values) {
   uint32_t step = (values.back() - values.front()) / least_steps;
   for (size_t i = 1; i < values.size(); ++i) step = std::min(step, values[i] - values[i - 1]);
   if (step < 2) return;
+  step_ = step;
   values_.push_back(values[0]);
   for (size_t i = 1; i < values.size(); ++i) {
     const uint32_t gap = values[i] - values[i - 1], parts = (gap + step / 2) / step;

@@ -18,12 +18,15 @@ class Raster {
   /// it takes to be as near to each other as the nearest two are, or as a 32nd of the range.
   explicit Raster(std::span<const uint32_t> values);
   bool empty() const { return values_.empty(); }
+  /// About how far they are apart, at least; 0 of an empty one.
+  uint32_t step() const { return step_; }
   /// Ascending.
   const std::vector<uint32_t>& values() const { return values_; }
   /// The nearest of these, the lower one of two. `value` within the range of those that it is made from.
   uint32_t operator()(uint32_t value) const { return nearest_[value]; }
 
  private:
+  uint32_t step_ = 0;
   std::vector<uint32_t> values_;
   std::vector<uint16_t> nearest_;
 };

@@ -113,23 +113,30 @@ std::vector<double> numbers(const Bytes& voxels, VoxelFormat format) {
   return out;
 }
 
+/// Those of a level of `dims`.
+std::vector<double> means_of(const std::vector<double>& values, Index3 dims, VoxelFormat format) {
+  const Index3 half = level_dims(dims, 1);
+  std::vector<double> means;
+  for (int64_t n = 0; n < half.x * half.y * half.z; ++n)
+    means.push_back(mean_at(values, dims, {n % half.x, n / half.x % half.y, n / (half.x * half.y)},
+                            format == VoxelFormat::float32));
+  return means;
+}
+
+/// Those of 8 bits may be off by 2.
 TEST(Packed, LevelsAreMeans) {
   for (const VoxelFormat format : {VoxelFormat::density8, VoxelFormat::density16, VoxelFormat::float32}) {
     const VolumeInfo info = make_info({37, 18, 51}, format);
     voxkit::test::MemorySource source(info, bytes_of(make_voxels(info, Content::noise, 7), format));
     const auto volume = open(encode(source, {}).bytes);
     ASSERT_TRUE(volume);
-    std::vector<double> finer = numbers(decode(*volume), format);
+    std::vector<double> means = numbers(decode(*volume), format);
     for (int level = 1; level < volume->params().levels; ++level) {
-      const Index3 dims = volume->levels()[static_cast<size_t>(level)].dims,
-                   below = volume->levels()[static_cast<size_t>(level - 1)].dims;
+      means = means_of(means, volume->levels()[static_cast<size_t>(level - 1)].dims, format);
       const auto coarser = numbers(decode(*volume, level), format);
-      for (size_t i = 0; i < coarser.size(); ++i) {
-        const auto n = static_cast<int64_t>(i);
-        const Index3 at(n % dims.x, n / dims.x % dims.y, n / (dims.x * dims.y));
-        ASSERT_EQ(coarser[i], mean_at(finer, below, at, format == VoxelFormat::float32)) << "level " << level;
-      }
-      finer = coarser;
+      for (size_t i = 0; i < coarser.size(); ++i)
+        ASSERT_LE(std::abs(coarser[i] - means[i]), format == VoxelFormat::density8 ? 2 : 0)
+            << "level " << level;
     }
   }
 }
@@ -145,18 +152,11 @@ TEST(Packed, LevelsAreWithinTheBoundOfTheirMeans) {
       ASSERT_TRUE(volume);
       std::vector<double> means = numbers(voxels, format);
       for (int level = 0; level < volume->params().levels; ++level) {
-        if (level > 0) {
-          const Index3 below = volume->levels()[static_cast<size_t>(level - 1)].dims,
-                       dims = level_dims(below, 1);
-          std::vector<double> next;
-          for (int64_t n = 0; n < dims.x * dims.y * dims.z; ++n)
-            next.push_back(mean_at(means, below, {n % dims.x, n / dims.x % dims.y, n / (dims.x * dims.y)},
-                                   format == VoxelFormat::float32));
-          means = next;
-        }
+        if (level > 0) means = means_of(means, volume->levels()[static_cast<size_t>(level - 1)].dims, format);
+        const double promised = level > 0 && format == VoxelFormat::density8 ? std::max(bound, 2.0) : bound;
         const auto near = numbers(decode(*volume, level), format);
         for (size_t i = 0; i < means.size(); ++i)
-          ASSERT_LE(std::abs(means[i] - near[i]), bound * 1.000001) << "level " << level;
+          ASSERT_LE(std::abs(means[i] - near[i]), promised * 1.000001) << "level " << level;
       }
     }
 }
