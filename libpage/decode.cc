@@ -10,44 +10,44 @@ namespace {
 
 /// Decodes the pages of some lanes, all of one extent, row by row. What they become does not depend on the
 /// type of samples, so that there are few of these, which are much to compile.
-template <class Width, int lane_count>
+template <class Width, int lane_count, bool masked>
 [[gnu::always_inline]] inline void decode_rows_body(const ModelData& model, Extent extent,
                                                     std::array<Lane<Width>, lane_count>& lanes,
                                                     std::array<typename Width::Stored*, lane_count> out) {
   using Stored = typename Width::Stored;
-  decode_lanes<Width, lane_count>(
+  decode_lanes<Width, lane_count, masked>(
       model, extent, lanes, [&](size_t n, const Stored* row) __attribute__((always_inline)) {
         std::copy(row, row + extent.nx, out[n]);
         out[n] += extent.nx;
       });
 }
 
-template <class Width, int lane_count>
+template <class Width, int lane_count, bool masked>
 void decode_rows_anywhere(const ModelData& model, Extent extent, std::array<Lane<Width>, lane_count>& lanes,
                           const std::array<typename Width::Stored*, lane_count>& out) {
-  decode_rows_body<Width, lane_count>(model, extent, lanes, out);
+  decode_rows_body<Width, lane_count, masked>(model, extent, lanes, out);
 }
 #ifdef VOXKIT_AVX2
-template <class Width, int lane_count>
+template <class Width, int lane_count, bool masked>
 VOXKIT_AVX2_CODE void decode_rows_avx2(const ModelData& model, Extent extent,
                                        std::array<Lane<Width>, lane_count>& lanes,
                                        const std::array<typename Width::Stored*, lane_count>& out) {
-  decode_rows_body<Width, lane_count>(model, extent, lanes, out);
+  decode_rows_body<Width, lane_count, masked>(model, extent, lanes, out);
 }
 #endif
 
 /// The same on every machine, and as fast as it can.
-template <class Width, int lane_count>
+template <class Width, int lane_count, bool masked>
 void decode_rows(const ModelData& model, Extent extent, std::array<Lane<Width>, lane_count>& lanes,
                  const std::array<typename Width::Stored*, lane_count>& out) {
 #ifdef VOXKIT_AVX2
-  if (has_avx2()) return decode_rows_avx2<Width, lane_count>(model, extent, lanes, out);
+  if (has_avx2()) return decode_rows_avx2<Width, lane_count, masked>(model, extent, lanes, out);
 #endif
-  decode_rows_anywhere<Width, lane_count>(model, extent, lanes, out);
+  decode_rows_anywhere<Width, lane_count, masked>(model, extent, lanes, out);
 }
 
 /// Pages of one extent, all of them with residuals.
-template <class Width, int lane_count, class T>
+template <class Width, int lane_count, bool masked, class T>
 void decode_group(const ModelData& model, const PageJob<T>* const* jobs, bool* whole) {
   using Stored = typename Width::Stored;
   std::array<Lane<Width>, lane_count> lanes;
@@ -55,10 +55,11 @@ void decode_group(const ModelData& model, const PageJob<T>* const* jobs, bool* w
   std::array<Stored*, lane_count> out;
   for (size_t n = 0; n < lane_count; ++n) {
     lanes[n].coder.open(jobs[n]->page);
+    lanes[n].mask = jobs[n]->mask;
     out[n] = values[n].data();
     if (model.classes.parents) load_parents(model, jobs[n]->parent, jobs[n]->extent, lanes[n].memory);
   }
-  decode_rows<Width, lane_count>(model, jobs[0]->extent, lanes, out);
+  decode_rows<Width, lane_count, masked>(model, jobs[0]->extent, lanes, out);
   const uint32_t* const palette = model.palette.empty() ? nullptr : model.palette.data();
   for (size_t n = 0; n < lane_count; ++n) {
     whole[n] = lanes[n].coder.finished();
@@ -79,6 +80,8 @@ Status usable(const Model& model, const PageJob<T>& job) {
         "a page decoded without the parents of all its voxels: expected those that its model has");
   if (model.max_sample() > std::numeric_limits<T>::max())
     return bad_usage("a page decoded into samples of too few bits: expected those of its model");
+  if (job.mask && model.data().wide())
+    return bad_usage("a page with void voxels of more than 16 bits: expected a model of at most so many");
   return {};
 }
 
@@ -118,14 +121,14 @@ Status decode_all(const Model& shared, std::span<const PageJob<T>> jobs, size_t*
     std::array<bool, group> whole{};
     if (count == group) {
       if (model.wide())
-        decode_group<Wide, group>(model, waiting.data(), whole.data());
+        decode_group<Wide, group, false>(model, waiting.data(), whole.data());
       else
-        decode_group<Narrow, group>(model, waiting.data(), whole.data());
+        decode_group<Narrow, group, false>(model, waiting.data(), whole.data());
     } else if (count == 1) {
       if (model.wide())
-        decode_group<Wide, 1>(model, waiting.data(), whole.data());
+        decode_group<Wide, 1, false>(model, waiting.data(), whole.data());
       else
-        decode_group<Narrow, 1>(model, waiting.data(), whole.data());
+        decode_group<Narrow, 1, false>(model, waiting.data(), whole.data());
     }
     for (size_t n = 0; n < count; ++n) judge(waiting[n], whole[n]);
     count = 0;
@@ -133,6 +136,12 @@ Status decode_all(const Model& shared, std::span<const PageJob<T>> jobs, size_t*
   for (const PageJob<T>& job : jobs) {
     bool whole = true;
     if (decode_constant(model, job, whole)) {
+      judge(&job, whole);
+      continue;
+    }
+    if (job.mask) {
+      const PageJob<T>* const alone = &job;
+      decode_group<Narrow, 1, true>(model, &alone, &whole);
       judge(&job, whole);
       continue;
     }
@@ -148,24 +157,24 @@ Status decode_all(const Model& shared, std::span<const PageJob<T>> jobs, size_t*
 
 template <class T>
 Status decode_one(const Model& model, std::span<const std::byte> page, Extent extent, std::span<T> out,
-                  const Parent<T>& parent) {
-  const PageJob<T> job{page, extent, out, parent};
+                  const Parent<T>& parent, const Mask* mask) {
+  const PageJob<T> job{page, extent, out, parent, mask};
   return decode_all<T>(model, std::span<const PageJob<T>>(&job, 1), nullptr);
 }
 
 }  // namespace
 
 Status decode_page(const Model& model, std::span<const std::byte> page, Extent extent, std::span<uint8_t> out,
-                   const Parent<uint8_t>& parent) {
-  return decode_one(model, page, extent, out, parent);
+                   const Parent<uint8_t>& parent, const Mask* mask) {
+  return decode_one(model, page, extent, out, parent, mask);
 }
 Status decode_page(const Model& model, std::span<const std::byte> page, Extent extent,
-                   std::span<uint16_t> out, const Parent<uint16_t>& parent) {
-  return decode_one(model, page, extent, out, parent);
+                   std::span<uint16_t> out, const Parent<uint16_t>& parent, const Mask* mask) {
+  return decode_one(model, page, extent, out, parent, mask);
 }
 Status decode_page(const Model& model, std::span<const std::byte> page, Extent extent,
-                   std::span<uint32_t> out, const Parent<uint32_t>& parent) {
-  return decode_one(model, page, extent, out, parent);
+                   std::span<uint32_t> out, const Parent<uint32_t>& parent, const Mask* mask) {
+  return decode_one(model, page, extent, out, parent, mask);
 }
 Status decode_pages(const Model& model, std::span<const PageJob<uint8_t>> jobs, size_t* failed) {
   return decode_all(model, jobs, failed);

@@ -17,6 +17,7 @@ struct Lane {
   RansDecoder coder;
   Memory<Width> memory;
   RowPlan<Width> plan;
+  const Mask* mask = nullptr;  ///< of pages with void voxels
 };
 
 template <class Width>
@@ -40,8 +41,8 @@ template <class Width>
   }
 }
 
-/// Calls `row_out(lane number, samples of the row)` for each row of each lane in order.
-template <class Width, int lane_count, class RowOut>
+/// Pages have void voxels if `masked`. Calls `row_out(lane number, samples of the row)` for each row of each lane in order.
+template <class Width, int lane_count, bool masked, class RowOut>
 [[gnu::always_inline]] inline void decode_lanes(const ModelData& model, Extent extent,
                                                 std::array<Lane<Width>, lane_count>& lanes,
                                                 const RowOut& row_out) {
@@ -78,7 +79,8 @@ template <class Width, int lane_count, class RowOut>
         const auto* table = reinterpret_cast<const DecodingTable*>(
             table_bytes[n] + (next_child & (0 - (x & 1))) +
             size_t{8} * step_of_activity<sizeof(DecodingTable) / 8>[activity_at(plan, x, left[n])]);
-        const uint32_t folded = decode_folded<Width>(coder[n], *table);
+        const bool is_void = masked && (lanes[n].mask->row(y, z) >> x & 1) == 0;
+        const uint32_t folded = is_void ? 0 : decode_folded<Width>(coder[n], *table);
         const int64_t mean = predict(plan, x, left[n]);
         const int64_t predicted = std::clamp(mean >> weight_bits, lowest, highest);
         const int64_t negative = sign(folded, mirror_of(mean));

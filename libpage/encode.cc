@@ -31,28 +31,27 @@ void write_residuals(const ModelData& model, const Residuals& residuals, std::ve
 
 template <class T>
 Status encode(const Model& shared, std::span<const T> samples, Extent extent, std::vector<std::byte>& out,
-              const Parent<T>& parent, std::span<T> decoded) {
+              const Parent<T>& parent, std::span<T> decoded, const Mask* mask) {
   const ModelData& model = shared.data();
   if (!extent.valid() || samples.size() != static_cast<size_t>(extent.voxels()))
     return bad_usage("a page of another number of samples than its extent: expected them all");
   if (model.classes.parents && !covers(parent, extent))
     return bad_usage("a page without the parents of all its voxels: expected those that its model has");
+  if (mask && model.wide())
+    return bad_usage("a page with void voxels of more than 16 bits: expected a model of at most so many");
   const auto tell = [&](auto value_at) {
     for (size_t i = 0; i < decoded.size(); ++i) decoded[i] = sample_of<T>(model, value_at(i));
   };
-  std::array<uint32_t, max_voxels> values;
-  if (model.palette.empty()) {
-    std::ranges::copy(samples, values.begin());
-  } else {
-    for (size_t i = 0; i < samples.size(); ++i) {
-      const auto at = std::ranges::lower_bound(model.palette, samples[i]);
-      if (at == model.palette.end() || *at != samples[i])
-        return bad_usage(
-            "a sample that the palette of the model lacks: expected all values when it was made");
-      values[i] = static_cast<uint32_t>(at - model.palette.begin());
-    }
+  if (mask && mask->empty()) {
+    tell([&](size_t) { return model.background; });
+    return {};
   }
-  const std::span<const uint32_t> page(values.data(), samples.size());
+  std::array<uint32_t, max_voxels> values;
+  std::ranges::copy(samples, values.begin());
+  const std::span<uint32_t> page(values.data(), samples.size());
+  if (mask) fill_void(*mask, extent, page);
+  if (!number(model.palette, page))
+    return bad_usage("a sample that the palette of the model lacks: expected all values when it was made");
   const auto range = std::ranges::minmax(page);
   const uint32_t least = range.min, greatest = range.max;
   if (greatest > model.max_value)
@@ -73,10 +72,10 @@ Status encode(const Model& shared, std::span<const T> samples, Extent extent, st
   Residuals residuals;
   std::array<uint32_t, max_voxels> lossy;
   if (model.wide()) {
-    find_residuals<Wide>(model, page, extent, parent, residuals, lossy.data());
+    find_residuals<Wide>(model, page, extent, parent, mask, residuals, lossy.data());
     write_residuals<Wide>(model, residuals, out);
   } else {
-    find_residuals<Narrow>(model, page, extent, parent, residuals, lossy.data());
+    find_residuals<Narrow>(model, page, extent, parent, mask, residuals, lossy.data());
     write_residuals<Narrow>(model, residuals, out);
   }
   tell([&](size_t i) { return lossy[i]; });
@@ -86,16 +85,19 @@ Status encode(const Model& shared, std::span<const T> samples, Extent extent, st
 }  // namespace
 
 Status encode_page(const Model& model, std::span<const uint8_t> samples, Extent extent,
-                   std::vector<std::byte>& out, const Parent<uint8_t>& parent, std::span<uint8_t> decoded) {
-  return encode(model, samples, extent, out, parent, decoded);
+                   std::vector<std::byte>& out, const Parent<uint8_t>& parent, std::span<uint8_t> decoded,
+                   const Mask* mask) {
+  return encode(model, samples, extent, out, parent, decoded, mask);
 }
 Status encode_page(const Model& model, std::span<const uint16_t> samples, Extent extent,
-                   std::vector<std::byte>& out, const Parent<uint16_t>& parent, std::span<uint16_t> decoded) {
-  return encode(model, samples, extent, out, parent, decoded);
+                   std::vector<std::byte>& out, const Parent<uint16_t>& parent, std::span<uint16_t> decoded,
+                   const Mask* mask) {
+  return encode(model, samples, extent, out, parent, decoded, mask);
 }
 Status encode_page(const Model& model, std::span<const uint32_t> samples, Extent extent,
-                   std::vector<std::byte>& out, const Parent<uint32_t>& parent, std::span<uint32_t> decoded) {
-  return encode(model, samples, extent, out, parent, decoded);
+                   std::vector<std::byte>& out, const Parent<uint32_t>& parent, std::span<uint32_t> decoded,
+                   const Mask* mask) {
+  return encode(model, samples, extent, out, parent, decoded, mask);
 }
 
 }  // namespace voxkit::page

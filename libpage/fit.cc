@@ -102,6 +102,7 @@ void Fit::add_page(const FitPage& page, std::vector<Equations>& all) const {
   for (int z = 0; z < e.nz; ++z)
     for (int y = 0; y < e.ny; ++y)
       for (int x = 0; x < e.nx; ++x, ++at) {
+        if (page.mask && !page.mask->solid(x, y, z)) continue;
         const int voxel_class = classes_.of(classes_.along(x, e.nx), classes_.along(y, e.ny), z);
         const int rest = classes_.rest(voxel_class);
         if (rest < 0) continue;

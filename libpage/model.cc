@@ -71,6 +71,16 @@ uint32_t ModelData::nearest(uint32_t sample) const {
   return sample - *(at - 1) <= *at - sample ? number - 1 : number;
 }
 
+bool number(std::span<const uint32_t> palette, std::span<uint32_t> samples) {
+  if (palette.empty()) return true;
+  for (uint32_t& sample : samples) {
+    const auto at = std::ranges::lower_bound(palette, sample);
+    if (at == palette.end() || *at != sample) return false;
+    sample = static_cast<uint32_t>(at - palette.begin());
+  }
+  return true;
+}
+
 std::vector<std::byte> Model::serialise() const {
   const ModelData& m = *data_;
   BitWriter out;

@@ -37,6 +37,7 @@ struct Sampled {
   std::vector<uint32_t> decoded;
   Parent<uint32_t> parent{};        ///< samples
   std::vector<uint32_t> parents{};  ///< as numbers
+  const Mask* mask = nullptr;
 };
 
 bool is_constant(const ModelData& model, const Sampled& page) {
@@ -65,9 +66,9 @@ uint32_t common_value(const ModelData& model, const std::vector<Sampled>& pages)
 
 void run(const ModelData& model, const Sampled& page, Residuals& out, uint32_t* decoded) {
   if (model.wide())
-    find_residuals<Wide>(model, page.values, page.extent, page.parent, out, decoded);
+    find_residuals<Wide>(model, page.values, page.extent, page.parent, page.mask, out, decoded);
   else
-    find_residuals<Narrow>(model, page.values, page.extent, page.parent, out, decoded);
+    find_residuals<Narrow>(model, page.values, page.extent, page.parent, page.mask, out, decoded);
 }
 
 /// Codes the pages with the weights that the model has: what their symbols are, and what is decoded.
@@ -76,7 +77,7 @@ std::vector<Counts> count_symbols(const ModelData& model, std::vector<Sampled>& 
   Residuals residuals;
   for (Sampled& page : pages) {
     run(model, page, residuals, page.decoded.data());
-    for (size_t i = 0; i < page.values.size(); ++i)
+    for (size_t i = 0; i < static_cast<size_t>(residuals.count); ++i)
       ++counts[residuals.context[i]][symbol_of(residuals.folded[i])];
   }
   return counts;
@@ -96,8 +97,8 @@ uint64_t cost(const std::vector<Counts>& counts) {
   return bits;
 }
 
-/// Weights and tables. What is predicted from is what the decoder has, which depends on the weights: they are
-/// fitted again to what those before led to, and the best are kept.
+/// Weights and tables. What is predicted from is what the decoder has, which depends on the weights where
+/// there is a bound or void: they are fitted again to what those before led to, and the best are kept.
 void fit(ModelData& model, std::vector<Sampled>& pages) {
   model.background = common_value(model, pages);
   std::erase_if(pages, [&](const Sampled& page) { return is_constant(model, page); });
@@ -108,14 +109,15 @@ void fit(ModelData& model, std::vector<Sampled>& pages) {
     Parent<uint32_t> parent = page.parent;
     for (const uint32_t sample : parent.samples) page.parents.push_back(model.nearest(sample));
     parent.samples = page.parents;
-    sources.push_back({page.extent, page.values, page.decoded, parent});
+    sources.push_back({page.extent, page.values, page.decoded, parent, page.mask});
   }
   model.derive();
   Fit equations(model.classes, model.max_value, model.max_error);
   double noise = (4 * e * e + 4 * e) / 12;
   std::array<Weights, most_classes> best{};
   std::vector<Counts> best_counts;
-  const int rounds = model.max_error == 0 ? 1 : most_rounds;
+  const bool masked = std::ranges::any_of(pages, [](const Sampled& page) { return page.mask != nullptr; });
+  const int rounds = model.max_error == 0 && !masked ? 1 : most_rounds;
   for (int round = 0; round < rounds; ++round) {
     equations.add(sources, noise);
     noise = 0;
@@ -134,21 +136,29 @@ void fit(ModelData& model, std::vector<Sampled>& pages) {
 }  // namespace
 
 template <class T>
-void ModelBuilder::keep(std::span<const T> samples, Extent extent, const Parent<T>& parent) {
+void ModelBuilder::keep(std::span<const T> samples, Extent extent, const Parent<T>& parent,
+                        const Mask* mask) {
+  if (mask && mask->empty()) return;
   pages_.push_back({extent,
                     {samples.begin(), samples.end()},
                     {parent.samples.begin(), parent.samples.end()},
-                    {{}, parent.extent, parent.x, parent.y, parent.z}});
+                    {{}, parent.extent, parent.x, parent.y, parent.z},
+                    mask ? std::optional(*mask) : std::nullopt});
+  if (mask && extent.valid() && samples.size() == static_cast<size_t>(extent.voxels()))
+    fill_void(*mask, extent, std::span(pages_.back().samples));
   type_max_ = std::max<uint32_t>(type_max_, std::numeric_limits<T>::max());
 }
-void ModelBuilder::add(std::span<const uint8_t> samples, Extent extent, const Parent<uint8_t>& parent) {
-  keep(samples, extent, parent);
+void ModelBuilder::add(std::span<const uint8_t> samples, Extent extent, const Parent<uint8_t>& parent,
+                       const Mask* mask) {
+  keep(samples, extent, parent, mask);
 }
-void ModelBuilder::add(std::span<const uint16_t> samples, Extent extent, const Parent<uint16_t>& parent) {
-  keep(samples, extent, parent);
+void ModelBuilder::add(std::span<const uint16_t> samples, Extent extent, const Parent<uint16_t>& parent,
+                       const Mask* mask) {
+  keep(samples, extent, parent, mask);
 }
-void ModelBuilder::add(std::span<const uint32_t> samples, Extent extent, const Parent<uint32_t>& parent) {
-  keep(samples, extent, parent);
+void ModelBuilder::add(std::span<const uint32_t> samples, Extent extent, const Parent<uint32_t>& parent,
+                       const Mask* mask) {
+  keep(samples, extent, parent, mask);
 }
 
 namespace {
@@ -164,20 +174,9 @@ Result<size_t> size_with(const Model& model, std::span<const ModelBuilder::Page>
   std::vector<std::byte> bytes = model.serialise();
   for (const ModelBuilder::Page& page : pages)
     VOX_CHECK(
-        encode_page(model, std::span<const uint32_t>(page.samples), page.extent, bytes, parent_of(page)));
+        encode_page(model, std::span<const uint32_t>(page.samples), page.extent, bytes, parent_of(page), {},
+                    page.mask ? &*page.mask : nullptr));
   return bytes.size();
-}
-
-/// The numbers that samples have in an ascending palette, or themselves where it is empty. False: one is
-/// missing.
-bool number(std::span<const uint32_t> palette, std::vector<uint32_t>& samples) {
-  if (palette.empty()) return true;
-  for (uint32_t& sample : samples) {
-    const auto at = std::ranges::lower_bound(palette, sample);
-    if (at == palette.end() || *at != sample) return false;
-    sample = static_cast<uint32_t>(at - palette.begin());
-  }
-  return true;
 }
 
 }  // namespace
@@ -206,7 +205,8 @@ Result<Model> ModelBuilder::build(const ModelOptions& options) const {
     made->classes.parents = options.parents;
     std::vector<Sampled> pages;
     for (const Page& page : pages_) {
-      pages.push_back({page.extent, page.samples, {}, parent_of(page)});
+      pages.push_back(
+          {page.extent, page.samples, {}, parent_of(page), {}, page.mask ? &*page.mask : nullptr});
       if (!number(palette, pages.back().values))
         return bad_usage("page model: a sample that is none of the values");
     }

@@ -3,9 +3,11 @@
 
 #include <array>
 #include <cstdint>
+#include <span>
 #include <vector>
 
 #include "libpage/context.h"
+#include "libpage/mask.h"
 #include "libpage/predictor.h"
 #include "libpage/symbols.h"
 #include "libpage/tables.h"
@@ -47,6 +49,10 @@ struct ModelData {
   void derive();
   void set_weights(const std::array<Weights, most_classes>& fitted);
 };
+
+/// The numbers that samples have in an ascending palette, or themselves where it is empty. False: one is
+/// missing.
+bool number(std::span<const uint32_t> palette, std::span<uint32_t> samples);
 
 template <class T>
 T sample_of(const ModelData& model, uint32_t value) {

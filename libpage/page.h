@@ -5,11 +5,13 @@
 #include <cstddef>
 #include <cstdint>
 #include <memory>
+#include <optional>
 #include <span>
 #include <vector>
 
 #include "formats/result.h"
 #include "libpage/extent.h"
+#include "libpage/mask.h"
 
 namespace voxkit::page {
 
@@ -65,10 +67,13 @@ struct ModelOptions {
 /// sums are integers, or of a fixed order.
 class ModelBuilder {
  public:
-  /// Keeps a copy of a page: `extent.voxels()` samples, and of its parents, if any.
-  void add(std::span<const uint8_t> samples, Extent extent, const Parent<uint8_t>& parent = {});
-  void add(std::span<const uint16_t> samples, Extent extent, const Parent<uint16_t>& parent = {});
-  void add(std::span<const uint32_t> samples, Extent extent, const Parent<uint32_t>& parent = {});
+  /// Keeps a copy of a page: `extent.voxels()` samples, and of its parents and its mask, if any.
+  void add(std::span<const uint8_t> samples, Extent extent, const Parent<uint8_t>& parent = {},
+           const Mask* mask = nullptr);
+  void add(std::span<const uint16_t> samples, Extent extent, const Parent<uint16_t>& parent = {},
+           const Mask* mask = nullptr);
+  void add(std::span<const uint32_t> samples, Extent extent, const Parent<uint32_t>& parent = {},
+           const Mask* mask = nullptr);
   /// Errors: ErrorCode::usage where options contradict each other or the samples.
   Result<Model> build(const ModelOptions& options) const;
 
@@ -77,39 +82,42 @@ class ModelBuilder {
     std::vector<uint32_t> samples;
     std::vector<uint32_t> parents;  ///< the whole page of parents; empty: none
     Parent<uint32_t> parent;        ///< where it lies in these; its samples are not set
+    std::optional<Mask> mask;       ///< none: all voxels are solid
   };
 
  private:
   template <class T>
-  void keep(std::span<const T> samples, Extent extent, const Parent<T>& parent);
+  void keep(std::span<const T> samples, Extent extent, const Parent<T>& parent, const Mask* mask);
   std::vector<Page> pages_;
   uint32_t type_max_ = 0;  ///< of the widest type of samples
 };
 
 /// Appends the bytes of a page to `out`: none where all samples are within the bound of the background. They
 /// depend on nothing but the model, the samples and, where the model has parents, `parent`. `decoded`, if it
-/// is not empty, receives what the decoder will have. Errors: ErrorCode::usage for samples that the model
-/// cannot hold, or that are not `extent.voxels()` many, and for parents that are not those of all voxels.
+/// is not empty, receives what the decoder will have. With a mask, only solid voxels are coded; others come
+/// back as they are predicted, so that what is predicted from them goes on smoothly. Errors: ErrorCode::usage
+/// for samples that the model cannot hold, or that are not `extent.voxels()` many, for parents that are not
+/// those of all voxels, and for a mask with a model of samples of more than 16 bits.
 Status encode_page(const Model& model, std::span<const uint8_t> samples, Extent extent,
                    std::vector<std::byte>& out, const Parent<uint8_t>& parent = {},
-                   std::span<uint8_t> decoded = {});
+                   std::span<uint8_t> decoded = {}, const Mask* mask = nullptr);
 Status encode_page(const Model& model, std::span<const uint16_t> samples, Extent extent,
                    std::vector<std::byte>& out, const Parent<uint16_t>& parent = {},
-                   std::span<uint16_t> decoded = {});
+                   std::span<uint16_t> decoded = {}, const Mask* mask = nullptr);
 Status encode_page(const Model& model, std::span<const uint32_t> samples, Extent extent,
                    std::vector<std::byte>& out, const Parent<uint32_t>& parent = {},
-                   std::span<uint32_t> decoded = {});
+                   std::span<uint32_t> decoded = {}, const Mask* mask = nullptr);
 
 /// Decodes a page of exactly these bytes into `extent.voxels()` samples. Safe on any bytes: it touches
 /// nothing else, and damage that shows is ErrorCode::input; what was written by then is undefined.
-/// ErrorCode::usage where the type is too narrow for the model, `out` is not of that size, or `parent` is not
-/// as when it was encoded; other samples of it than then are as good as damage to the page.
+/// ErrorCode::usage where the type is too narrow for the model, `out` is not of that size, or `parent` or `mask`
+/// are not as when it was encoded; other samples or voxels of these than then are as good as damage to the page.
 Status decode_page(const Model& model, std::span<const std::byte> page, Extent extent, std::span<uint8_t> out,
-                   const Parent<uint8_t>& parent = {});
+                   const Parent<uint8_t>& parent = {}, const Mask* mask = nullptr);
 Status decode_page(const Model& model, std::span<const std::byte> page, Extent extent,
-                   std::span<uint16_t> out, const Parent<uint16_t>& parent = {});
+                   std::span<uint16_t> out, const Parent<uint16_t>& parent = {}, const Mask* mask = nullptr);
 Status decode_page(const Model& model, std::span<const std::byte> page, Extent extent,
-                   std::span<uint32_t> out, const Parent<uint32_t>& parent = {});
+                   std::span<uint32_t> out, const Parent<uint32_t>& parent = {}, const Mask* mask = nullptr);
 
 /// One of several pages to decode.
 template <class T>
@@ -118,6 +126,7 @@ struct PageJob {
   Extent extent;
   std::span<T> out;
   Parent<T> parent{};
+  const Mask* mask = nullptr;  ///< as when it was encoded
 };
 /// As decode_page for each, several side by side, which is faster. The first damaged one in order is named by
 /// `failed`, if given; the others are decoded all the same.

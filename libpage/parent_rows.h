@@ -57,14 +57,17 @@ constexpr uint32_t first_child(int y, int z) {
   return static_cast<uint32_t>((z & 1) * 4 + (y & 1) * 2);
 }
 
+/// Whether the parents of all voxels of a page that begin at (x, y, z) of theirs are in it.
+inline bool covers(Extent parents, int x, int y, int z, Extent extent) {
+  return parents.valid() && x >= 0 && y >= 0 && z >= 0 && x < parents.nx && y < parents.ny && z < parents.nz &&
+         x + (extent.nx + 1) / 2 <= parents.nx && y + (extent.ny + 1) / 2 <= parents.ny &&
+         z + (extent.nz + 1) / 2 <= parents.nz;
+}
 /// Whether a page of parents has those of all voxels of a page, and is whole.
 template <class T>
 bool covers(const Parent<T>& parent, Extent extent) {
-  const Extent e = parent.extent;
-  return e.valid() && parent.samples.size() == static_cast<size_t>(e.voxels()) && parent.x >= 0 &&
-         parent.y >= 0 && parent.z >= 0 && parent.x < e.nx && parent.y < e.ny && parent.z < e.nz &&
-         parent.x + (extent.nx + 1) / 2 <= e.nx && parent.y + (extent.ny + 1) / 2 <= e.ny &&
-         parent.z + (extent.nz + 1) / 2 <= e.nz;
+  return covers(parent.extent, parent.x, parent.y, parent.z, extent) &&
+         parent.samples.size() == static_cast<size_t>(parent.extent.voxels());
 }
 
 }  // namespace voxkit::page

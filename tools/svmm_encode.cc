@@ -168,9 +168,6 @@ Result<int> work_packed(const Options& o, Inputs& inputs, Run& run) {
   VOX_CHECK(check_packed(o));
   VOX_TRY(auto source, inputs.open(true));
   const VoxelFormat format = source->info().format;
-  if (is_color(format))
-    return bad_usage(fmt::format("--layout packed: voxels are {}: expected scalars, or layout plain",
-                                 voxkit::name(format)));
   svmm::PackedOptions options;
   options.page_side = o.page == "8" ? 8 : 16;
   options.levels = o.levels == "on";
@@ -194,7 +191,8 @@ Result<int> work_packed(const Options& o, Inputs& inputs, Run& run) {
   encoding.lossless = exact && !info.rounded;
   if (o.verify) {
     const auto kept = [&](const VolumeDiff& diff) {
-      return exact ? diff.differing_voxels == 0 : diff.max_abs_error <= params.max_error;
+      return exact ? diff.differing_voxels == 0
+                   : (is_color(format) ? diff.max_distance : diff.max_abs_error) <= params.max_error;
     };
     VOX_TRY(const bool held, holds(source, inputs, *out, o, params.max_error, kept, encoding, run));
     if (!held) return 1;

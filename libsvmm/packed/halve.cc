@@ -56,6 +56,48 @@ void halve_row(const T* const* rows, int row_count, int64_t nx, Rule rule, int64
   }
 }
 
+/// The mean of solid colours of `channels` bytes, weighted by alpha if they have one, and of alpha that of
+/// all `count`. Not void, however dark or thin it is, unless all are.
+void mean_of_colors(const std::byte* const* voxels, int count, size_t channels, std::byte* out) {
+  std::array<uint32_t, 3> weighted{}, plain{};
+  uint32_t weight = 0, alpha = 0, solid = 0;
+  for (int i = 0; i < count; ++i) {
+    std::array<uint32_t, 4> v{};
+    for (size_t c = 0; c < channels; ++c) v[c] = std::to_integer<uint32_t>(voxels[i][c]);
+    if ((v[0] | v[1] | v[2] | v[3]) == 0) continue;
+    const uint32_t own = channels == 4 ? v[3] : 1;
+    for (size_t c = 0; c < 3; ++c) weighted[c] += own * v[c], plain[c] += v[c];
+    weight += own, alpha += v[3], ++solid;
+  }
+  std::fill(out, out + channels, std::byte{0});
+  if (solid == 0) return;
+  const auto& sums = weight != 0 ? weighted : plain;
+  if (weight == 0) weight = solid;
+  for (size_t c = 0; c < 3; ++c) out[c] = static_cast<std::byte>((2 * sums[c] + weight) / (2 * weight));
+  const auto all = static_cast<uint32_t>(count);
+  if (channels == 4) out[3] = static_cast<std::byte>((2 * alpha + all) / (2 * all));
+  if (std::any_of(out, out + channels, [](std::byte byte) { return byte != std::byte{0}; })) return;
+  out[alpha != 0 ? 3 : static_cast<size_t>(std::max_element(sums.begin(), sums.end()) - sums.begin())] =
+      std::byte{1};
+}
+
+Status halve_colors(ConstVoxelSpan in, Index3 size, size_t channels, std::byte* out, Context& ctx) {
+  const Index3 half = (size + int64_t{1}) / int64_t{2};
+  return parallel_for(ctx, half.y * half.z, [&](int64_t i) -> Status {
+    const int64_t y = i % half.y * 2, z = i / half.y * 2;
+    for (int64_t x = 0; x < half.x; ++x) {
+      const std::byte* voxels[8];
+      int count = 0;
+      for (int64_t k = z; k < std::min(z + 2, size.z); ++k)
+        for (int64_t j = y; j < std::min(y + 2, size.y); ++j)
+          for (int64_t a = 2 * x; a < std::min(2 * x + 2, size.x); ++a)
+            voxels[count++] = in.row(j, k) + a * static_cast<int64_t>(channels);
+      mean_of_colors(voxels, count, channels, out + (i * half.x + x) * static_cast<int64_t>(channels));
+    }
+    return {};
+  });
+}
+
 template <class T>
 Status halve_slab(ConstVoxelSpan in, Index3 size, const VolumeInfo& info, std::byte* out, Context& ctx) {
   const Index3 half = (size + int64_t{1}) / int64_t{2};
@@ -99,7 +141,9 @@ Result<std::unique_ptr<VolumeSource>> halved(VolumeSource& source,
     VOX_CHECK(read_slab(source, slab, voxels, ctx));
     const ConstVoxelSpan read{voxels.data, voxels.row_stride, voxels.slice_stride};
     if (visit) visit(read, slab.size());
-    VOX_CHECK(info.format == VoxelFormat::float32
+    VOX_CHECK(is_color(info.format)
+                  ? halve_colors(read, slab.size(), static_cast<size_t>(bytes), out->data(), ctx)
+              : info.format == VoxelFormat::float32
                   ? halve_slab<float>(read, slab.size(), info, out->data(), ctx)
               : info.format == VoxelFormat::density16
                   ? halve_slab<uint16_t>(read, slab.size(), info, out->data(), ctx)

@@ -18,6 +18,8 @@
 
 namespace voxkit::svmm {
 
+struct PackedPages;
+
 struct PackedOptions {
   /// No decoded voxel of level 0 is further from its original than this, nor one of another level from the
   /// mean it stands for; in units of samples. 0: all are equal. Only means of 8 bits may be off by 2 in any
@@ -28,10 +30,27 @@ struct PackedOptions {
   int page_side = 16;  ///< 16 or 8 voxels
 };
 
+/// What differences are more in their channels, and their greatest sample.
+inline constexpr int difference_offset = 255;
+inline constexpr uint32_t most_difference = 510;
+
+/// What the channels of a file are: G; R and B, or how much they are more than G; and of RGBA32 alpha.
+struct Channels {
+  size_t count = 4;
+  bool differences = true;
+
+  uint32_t greatest(size_t channel) const {
+    return differences && (channel == 1 || channel == 2) ? most_difference : 255;
+  }
+  friend bool operator==(const Channels&, const Channels&) = default;
+};
+
 /// What a file says about itself.
 struct PackedParams {
   int page_side = 16;
   ValueMap map;          ///< from voxels to the samples that pages hold
+  Channels channels;     ///< of colours
+  bool opaque = false;   ///< of RGBA32: whether all solid voxels of level 0 have an alpha of 255
   double max_error = 0;  ///< promised; for the reader's information
   int levels = 1;
 };
@@ -83,13 +102,12 @@ class PackedVolume {
   uint64_t pages_decoded() const;
 
  private:
-  struct Pages;
   PackedVolume();
   std::shared_ptr<const Container> container_;
   VolumeInfo info_;
   PackedParams params_;
   std::vector<PackedLevel> levels_;
-  std::unique_ptr<Pages> pages_;
+  std::unique_ptr<PackedPages> pages_;
 };
 
 /// A level of a file as a source; info() has that level's dims and place.

@@ -5,7 +5,6 @@
 #include <cmath>
 #include <cstring>
 #include <limits>
-#include <numeric>
 
 #include "formats/copy.h"
 #include "formats/mapped_file.h"
@@ -13,6 +12,7 @@
 #include "formats/reservation.h"
 #include "formats/volume_chunks.h"
 #include "libpage/page.h"
+#include "libsvmm/packed/color_encode.h"
 #include "libsvmm/packed/halve.h"
 #include "libsvmm/packed/packed_layout.h"
 #include "libsvmm/packed/raster.h"
@@ -20,9 +20,6 @@
 
 namespace voxkit::svmm {
 namespace {
-
-/// Pages that a model is fitted to.
-constexpr uint64_t most_samples = 512;
 
 /// How far voxels of coarser levels of 8 bits may be from means: what this saves is more than half of what
 /// levels of clean volumes cost.
@@ -94,19 +91,6 @@ class PageReader {
   const Raster& raster_;
   std::vector<std::byte> voxels_;
 };
-
-/// Runs of pages [first, last) that are in one row.
-std::vector<std::pair<uint64_t, uint64_t>> runs_of(const PageGrid& grid, uint64_t first, uint64_t last) {
-  std::vector<std::pair<uint64_t, uint64_t>> runs;
-  const auto row = static_cast<uint64_t>(grid.count.x);
-  constexpr uint64_t longest = 32;
-  while (first < last) {
-    const uint64_t end = std::min({last, (first / row + 1) * row, first + longest});
-    runs.emplace_back(first, end);
-    first = end;
-  }
-  return runs;
-}
 
 /// The codes of a coarser level as they were decoded, in a temporary file, page by page.
 class DecodedLevel {
@@ -227,17 +211,12 @@ class Encoder {
     return {};
   }
 
-  /// Pages of a level, spread over it and not on a grid of rows, whose content would be alike; all of them
-  /// where there are few.
+  /// Pages of a level that models are fitted to.
   template <class Take>
   Status sample_pages(int level, const Take& take) {
     const PageGrid pages = grid(level);
-    const uint64_t count = std::min(pages.pages(), most_samples);
     PageReader reader(source(level), pages, params_, raster(level));
-    const uint64_t all = pages.pages();
-    uint64_t stride = all - all * 382 / 1000;  // near the golden section; all is below 2^50
-    while (std::gcd(stride, all) != 1) ++stride;
-    for (uint64_t i = 0, number = stride / 2 % all; i < count; ++i, number = (number + stride) % all)
+    for (const uint64_t number : spread_pages(pages.pages(), most_sampled_pages))
       VOX_CHECK(reader.read(number, number + 1, take));
     return {};
   }
@@ -280,7 +259,7 @@ class Encoder {
   Result<page::Model> fit(int level) {
     page::ModelBuilder builder;
     VOX_TRY(const Reservation memory,
-            Reservation::take(2 * most_samples * page::max_voxels * sizeof(uint32_t),
+            Reservation::take(2 * most_sampled_pages * page::max_voxels * sizeof(uint32_t),
                               "pages to fit a model to", ctx_));
     page::ModelOptions options;
     options.parents = level + 1 < params_.levels;
@@ -382,9 +361,6 @@ class Encoder {
 Result<PackedParams> encode_packed(VolumeSource& source, const PackedOptions& options, const ByteSink& sink,
                                    Context& ctx) {
   const VolumeInfo& info = source.info();
-  if (is_color(info.format))
-    return bad_usage(
-        fmt::format("--layout packed: voxels are {}: expected scalars, or layout plain", name(info.format)));
   if (options.page_side != 8 && options.page_side != 16)
     return bad_usage(fmt::format("pages of {} voxels: expected 8 or 16", options.page_side));
   if (!(options.max_error >= 0 && options.max_error <= 1e300))
@@ -400,6 +376,7 @@ Result<PackedParams> encode_packed(VolumeSource& source, const PackedOptions& op
         "integers with a fill value, which is to come back as it is: expected a bound of 0 (--max-error 0 or "
         "--quality 100)");
   if (source.forward_only()) return fail(ErrorCode::internal, {}, "a source that was not spooled");
+  if (is_color(info.format)) return encode_packed_colors(source, options, sink, ctx);
   return Encoder(source, options, sink, ctx).run();
 }
 

@@ -5,6 +5,7 @@
 #include <bit>
 #include <cmath>
 #include <cstring>
+#include <numeric>
 
 #include "formats/little_endian.h"
 
@@ -25,11 +26,38 @@ int level_count(Index3 dims, int page_side) {
   return count;
 }
 
+std::vector<uint64_t> spread_pages(uint64_t pages, uint64_t most) {
+  std::vector<uint64_t> numbers;
+  uint64_t stride = pages - pages * 382 / 1000;  // near the golden section; there are fewer than 2^50
+  while (std::gcd(stride, pages) != 1) ++stride;
+  for (uint64_t i = 0, number = stride / 2 % pages; i < std::min(pages, most); ++i) {
+    numbers.push_back(number);
+    number = (number + stride) % pages;
+  }
+  return numbers;
+}
+
+std::vector<std::pair<uint64_t, uint64_t>> runs_of(const PageGrid& grid, uint64_t first, uint64_t last) {
+  std::vector<std::pair<uint64_t, uint64_t>> runs;
+  const auto row = static_cast<uint64_t>(grid.count.x);
+  constexpr uint64_t longest = 32;
+  while (first < last) {
+    const uint64_t end = std::min({last, (first / row + 1) * row, first + longest});
+    runs.emplace_back(first, end);
+    first = end;
+  }
+  return runs;
+}
+
 std::vector<std::byte> pack_params(const PackedParams& p) {
   std::vector<std::byte> bytes(params_bytes);
   bytes[0] = static_cast<std::byte>(std::countr_zero(static_cast<unsigned>(p.page_side)));
   bytes[1] = static_cast<std::byte>(p.levels);
   bytes[2] = static_cast<std::byte>(p.map.kind);
+  if (p.map.kind == CodeKind::colors) {
+    bytes[3] = static_cast<std::byte>(p.opaque);
+    bytes[4] = static_cast<std::byte>(p.channels.differences);
+  }
   store_le(&bytes[8], p.map.lo);
   store_le(&bytes[16], p.map.step);
   store_le(&bytes[24], p.max_error);
@@ -52,11 +80,18 @@ Result<PackedParams> unpack_packed_params(std::span<const std::byte> bytes, cons
   if (p.levels != 1 && p.levels != most)
     return bad(1, fmt::format("{} levels: expected 1 or {}", p.levels, most));
   const auto kind = std::to_integer<uint8_t>(bytes[2]);
-  if (is_color(info.format))
-    return bad_input(file, fmt::format("chunk VOLI: voxel format {}: expected scalars", name(info.format)));
   const bool floats = info.format == VoxelFormat::float32;
-  if (floats ? kind != 2 && kind != 3 : kind != 1)
+  if (is_color(info.format) ? kind != 4 : floats ? kind != 2 && kind != 3 : kind != 1)
     return bad(2, fmt::format("unknown kind of codes {}", kind));
+  const int opaque = std::to_integer<int>(bytes[3]);
+  if (opaque > 1 || (opaque == 1 && info.format != VoxelFormat::rgba32))
+    return bad(3, fmt::format("opaque {}: expected 0, or of RGBA32 0 or 1", opaque));
+  p.opaque = opaque == 1;
+  const int differences = std::to_integer<int>(bytes[4]);
+  if (is_color(info.format) ? differences > 1 : differences != 0)
+    return bad(4, fmt::format("differences {}: expected 0, or of colours 0 or 1", differences));
+  p.channels.differences = differences == 1;
+  p.channels.count = info.format == VoxelFormat::rgba32 ? 4 : 3;
   p.map.kind = static_cast<CodeKind>(kind);
   p.map.lo = load_le<double>(&bytes[8]);
   p.map.step = load_le<double>(&bytes[16]);

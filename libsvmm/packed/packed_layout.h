@@ -18,6 +18,9 @@ inline constexpr uint32_t packed_kind = chunk_kind("PAKP");
 /// Index: level; it is the model of coarser levels, too, up to the next that has one.
 inline constexpr uint32_t model_kind = chunk_kind("MODL");
 inline constexpr uint32_t pages_kind = chunk_kind("PAGE");  ///< index: level; part: run of pages
+/// Of colours: the masks of pages and their model, as those two. MODL has a part for each channel.
+inline constexpr uint32_t mask_kind = chunk_kind("MASK");
+inline constexpr uint32_t mask_model_kind = chunk_kind("MMOD");
 
 /// Level 31 of the longest side is one voxel.
 inline constexpr int max_packed_levels = 32;
@@ -60,6 +63,14 @@ struct PageGrid {
   uint64_t parts() const { return (pages() + pages_a_part() - 1) / pages_a_part(); }
   uint64_t pages_of(uint64_t part) const { return std::min(pages_a_part(), pages() - part * pages_a_part()); }
 };
+
+/// Pages that a model is fitted to.
+inline constexpr uint64_t most_sampled_pages = 512;
+/// Numbers of `most` of so many pages, spread over them and not on a grid of rows, whose content would be
+/// alike; all of them where there are no more.
+std::vector<uint64_t> spread_pages(uint64_t pages, uint64_t most);
+/// Runs of pages [first, last) that are in one row, none very long.
+std::vector<std::pair<uint64_t, uint64_t>> runs_of(const PageGrid& grid, uint64_t first, uint64_t last);
 
 /// Where the parents of page `child` lie in their page, which is number `above.number(child / 2)` of the
 /// level above; without samples.

@@ -8,8 +8,7 @@
 #include "formats/parallel.h"
 #include "formats/volume_chunks.h"
 #include "libpage/page.h"
-#include "libsvmm/packed/packed_layout.h"
-#include "libsvmm/packed/page_cache.h"
+#include "libsvmm/packed/packed_pages.h"
 
 namespace voxkit::svmm {
 namespace {
@@ -19,41 +18,33 @@ constexpr size_t most_jobs = 8;
 
 }  // namespace
 
-struct PackedVolume::Pages {
-  struct Level {
-    PageGrid grid;
-    std::vector<size_t> chunks;  ///< by part: index into the container's table
-    /// Parts whose lengths were found to be right.
-    std::unique_ptr<std::atomic<bool>[]> checked;
-    std::optional<page::Model> model;  ///< none: not yet known
-  };
-  explicit Pages(MemoryBudget& memory) : cache(memory) {}
+PartChunks::PartChunks(uint32_t chunk_kind, uint64_t entries_of_page, uint64_t parts)
+    : kind(chunk_kind),
+      entries(entries_of_page),
+      chunks(parts, ~size_t{0}),
+      checked(std::make_unique<std::atomic<bool>[]>(parts)) {}
 
-  std::vector<Level> levels;
-  mutable PageCache cache;  ///< of codes
-  mutable std::atomic<uint64_t> decoded{0};
-
-  /// The pages of a part; ErrorCode::input where it is damaged.
-  Result<PartView> part(const Container& container, int level, uint64_t number) const {
-    const Level& l = levels[static_cast<size_t>(level)];
-    VOX_TRY(const auto bytes, container.chunk(l.chunks[number]));
-    const PartView view(bytes, l.grid.pages_of(number));
-    if (!l.checked[number].load(std::memory_order_acquire)) {
-      if (!view.valid())
-        return bad_input(container.name(),
-                         fmt::format("chunk PAGE {}.{}: lengths of pages that do not add up", level, number));
-      l.checked[number].store(true, std::memory_order_release);
-    }
-    return view;
+Result<PartView> PackedPages::part(const Container& container, int level, const PartChunks& chunks,
+                                   uint64_t number) const {
+  VOX_TRY(const auto bytes, container.chunk(chunks.chunks[number]));
+  const PartView view(bytes, levels[static_cast<size_t>(level)].grid.pages_of(number) * chunks.entries);
+  if (!chunks.checked[number].load(std::memory_order_acquire)) {
+    if (!view.valid())
+      return bad_input(container.name(),
+                       fmt::format("chunk {} {}.{}: lengths of pages that do not add up",
+                                   chunks.kind == mask_kind ? "MASK" : "PAGE", level, number));
+    chunks.checked[number].store(true, std::memory_order_release);
   }
-  Result<std::span<const std::byte>> page(const Container& container, int level, uint64_t number) const {
-    const uint64_t a_part = levels[static_cast<size_t>(level)].grid.pages_a_part();
-    VOX_TRY(const PartView view, part(container, level, number / a_part));
-    return view.page(number % a_part);
-  }
-};
+  return view;
+}
 
-namespace {
+Result<std::span<const std::byte>> PackedPages::entry(const Container& container, int level,
+                                                      const PartChunks& chunks, uint64_t number,
+                                                      uint64_t entry) const {
+  const uint64_t a_part = levels[static_cast<size_t>(level)].grid.pages_a_part();
+  VOX_TRY(const PartView view, part(container, level, chunks, number / a_part));
+  return view.page(number % a_part * chunks.entries + entry);
+}
 
 Error at_page(const Container& container, int level, uint64_t number, const PageGrid& grid,
               const Error& error) {
@@ -61,6 +52,8 @@ Error at_page(const Container& container, int level, uint64_t number, const Page
   return {ErrorCode::input, container.name(),
           fmt::format("level {}, page at {},{},{}: {}", level, lo.x, lo.y, lo.z, error.what)};
 }
+
+namespace {
 
 /// Puts the codes of a page where its voxels go, as far as they are in `box`; `out` is at the box's corner.
 template <class T>
@@ -101,59 +94,94 @@ Result<std::shared_ptr<const PackedVolume>> PackedVolume::open(std::shared_ptr<c
   VOX_TRY(const auto bytes, container->only_chunk(packed_kind));
   VOX_TRY(volume->params_, unpack_packed_params(bytes, volume->info_, container->name()));
   const int levels = volume->params_.levels;
-  volume->pages_ = std::make_unique<Pages>(memory);
-  Pages& pages = *volume->pages_;
+  volume->pages_ = std::make_unique<PackedPages>(memory);
+  PackedPages& pages = *volume->pages_;
+  const VoxelFormat format = volume->info_.format;
+  const bool colors = is_color(format);
+  const Channels of_colors = volume->params_.channels;
+  const size_t channels = colors ? of_colors.count : 1;
   const auto& table = container->table();
   constexpr size_t none = ~size_t{0};
   for (int i = 0; i < levels; ++i) {
-    Pages::Level level;
+    PackedPages::Level level;
     level.grid = PageGrid(level_dims(volume->info_.dims, i), volume->params_.page_side);
-    if (level.grid.parts() > table.size())
-      return bad(fmt::format("fewer chunks PAGE than the {} of level {}", level.grid.parts(), i));
-    level.chunks.assign(level.grid.parts(), none);
-    level.checked = std::make_unique<std::atomic<bool>[]>(level.grid.parts());
+    const uint64_t parts = level.grid.parts();
+    if (parts > table.size()) return bad(fmt::format("fewer chunks PAGE than the {} of level {}", parts, i));
+    level.pages = PartChunks(pages_kind, channels, parts);
+    if (colors) level.masks = PartChunks(mask_kind, 1, parts);
     volume->levels_.push_back({level.grid.dims, level.grid.count, 0, 0, 0});
     pages.levels.push_back(std::move(level));
   }
-  std::vector<size_t> models(pages.levels.size(), none);
+  // By level: of each channel, and behind these of masks.
+  std::vector<std::array<size_t, most_channels + 1>> models(pages.levels.size());
+  for (auto& of_level : models) of_level.fill(none);
   for (size_t i = 0; i < table.size(); ++i) {
     const ChunkEntry& entry = table[i];
-    if (entry.kind != pages_kind && entry.kind != model_kind) continue;
+    const bool model = entry.kind == model_kind || (colors && entry.kind == mask_model_kind);
+    const bool part = entry.kind == pages_kind || (colors && entry.kind == mask_kind);
+    if (!model && !part) continue;
     size_t* slot = nullptr;
-    if (entry.kind == model_kind && entry.part == 0 && entry.index < static_cast<uint32_t>(levels))
-      slot = &models[entry.index];
-    if (entry.kind == pages_kind && entry.index < static_cast<uint32_t>(levels) &&
-        entry.part < pages.levels[entry.index].chunks.size())
-      slot = &pages.levels[entry.index].chunks[entry.part];
+    if (entry.index < static_cast<uint32_t>(levels)) {
+      PackedPages::Level& level = pages.levels[entry.index];
+      PartChunks& chunks = entry.kind == mask_kind ? level.masks : level.pages;
+      if (entry.kind == model_kind && entry.part < channels) slot = &models[entry.index][entry.part];
+      if (entry.kind == mask_model_kind && entry.part == 0) slot = &models[entry.index][channels];
+      if (part && entry.part < chunks.chunks.size()) slot = &chunks.chunks[entry.part];
+    }
     if (slot == nullptr || *slot != none)
       return bad(fmt::format("table: chunk {} {}.{}: not expected, or twice",
-                             entry.kind == pages_kind ? "PAGE" : "MODL", entry.index, entry.part));
+                             entry.kind == pages_kind   ? "PAGE"
+                             : entry.kind == model_kind ? "MODL"
+                             : entry.kind == mask_kind  ? "MASK"
+                                                        : "MMOD",
+                             entry.index, entry.part));
     *slot = i;
     PackedLevel& level = volume->levels_[entry.index];
-    (entry.kind == pages_kind ? level.page_bytes : level.model_bytes) += entry.length;
+    (part ? level.page_bytes : level.model_bytes) += entry.length;
     level.end = std::max(level.end, entry.offset + entry.stored);
   }
   for (size_t i = 0; i < pages.levels.size(); ++i)
-    for (size_t part = 0; part < pages.levels[i].chunks.size(); ++part)
-      if (pages.levels[i].chunks[part] == none) return bad(fmt::format("no chunk PAGE {}.{}", i, part));
+    for (const PartChunks* const chunks : {&pages.levels[i].pages, &pages.levels[i].masks})
+      for (size_t part = 0; part < chunks->chunks.size(); ++part)
+        if (chunks->chunks[part] == none)
+          return bad(fmt::format("no chunk {} {}.{}", chunks->kind == mask_kind ? "MASK" : "PAGE", i, part));
   for (size_t i = 0; i < pages.levels.size(); ++i) {
-    if (models[i] == none) {
-      if (i == 0) return bad("no chunk MODL 0.0");
-      pages.levels[i].model = pages.levels[i - 1].model;
+    PackedPages::Level& level = pages.levels[i];
+    const auto of_level = std::span(models[i]).first(channels + (colors ? 1 : 0));
+    if (std::ranges::all_of(of_level, [](size_t at) { return at == none; }) && i > 0) {
+      level.model = pages.levels[i - 1].model;
+      level.color = pages.levels[i - 1].color;
       continue;
     }
-    VOX_TRY(const auto model_bytes, container->chunk(models[i]));
-    auto model = page::Model::parse(model_bytes);
-    if (!model) return bad(fmt::format("chunk MODL {}.0: {}", i, model.error().what));
-    const uint64_t most = volume->info_.format == VoxelFormat::bitmap
-                              ? 1
-                              : (uint64_t{1} << 8 * code_bytes(volume->info_.format)) - 1;
-    if (model->max_sample() > most)
-      return bad(fmt::format("chunk MODL {}.0: samples up to {}: expected at most {}", i, model->max_sample(),
-                             most));
-    pages.levels[i].model = std::move(*model);
+    std::vector<page::Model> found;
+    for (size_t c = 0; c < channels; ++c) {
+      if (of_level[c] == none) return bad(fmt::format("no chunk MODL {}.{}", i, c));
+      VOX_TRY(const auto model_bytes, container->chunk(of_level[c]));
+      auto model = page::Model::parse(model_bytes);
+      if (!model) return bad(fmt::format("chunk MODL {}.{}: {}", i, c, model.error().what));
+      const uint64_t most = colors                          ? of_colors.greatest(c)
+                            : format == VoxelFormat::bitmap ? 1
+                                                            : (uint64_t{1} << 8 * code_bytes(format)) - 1;
+      if (model->max_sample() > most)
+        return bad(fmt::format("chunk MODL {}.{}: samples up to {}: expected at most {}", i, c,
+                               model->max_sample(), most));
+      found.push_back(std::move(*model));
+    }
+    if (!colors) {
+      level.model = std::move(found[0]);
+      continue;
+    }
+    if (of_level[channels] == none) return bad(fmt::format("no chunk MMOD {}.0", i));
+    VOX_TRY(const auto mask_bytes, container->chunk(of_level[channels]));
+    auto masks = page::MaskModel::parse(mask_bytes);
+    if (!masks) return bad(fmt::format("chunk MMOD {}.0: {}", i, masks.error().what));
+    for (const page::Model& model : found)
+      if (model.has_parents() != masks->has_parents())
+        return bad(fmt::format("models of level {}: some with parents, and some without", i));
+    level.color = ColorModel{std::move(*masks), std::move(found)};
   }
-  if (pages.levels.back().model->has_parents())
+  const PackedPages::Level& last = pages.levels.back();
+  if (colors ? last.color->mask.has_parents() : last.model->has_parents())
     return bad("the model of the coarsest level: expected one without parents");
   volume->container_ = std::move(container);
   return std::shared_ptr<const PackedVolume>(volume);
@@ -161,16 +189,13 @@ Result<std::shared_ptr<const PackedVolume>> PackedVolume::open(std::shared_ptr<c
 
 namespace {
 
-/// The coarser pages that were last used: pages that lie together mostly have the same.
-using Ancestors = std::array<std::pair<uint64_t, std::shared_ptr<const PageCache::Page>>, max_packed_levels>;
-
 template <class T>
-Result<std::shared_ptr<const PageCache::Page>> codes_of(const Container& container, const auto& pages,
+Result<std::shared_ptr<const PageCache::Page>> codes_of(const Container& container, const PackedPages& pages,
                                                         int level, uint64_t number, Ancestors& ancestors);
 
 /// The parents of a page whose model has them; what holds their samples is kept in `ancestors`.
 template <class T>
-Result<page::Parent<T>> parent_of(const Container& container, const auto& pages, int level, uint64_t number,
+Result<page::Parent<T>> parent_of(const Container& container, const PackedPages& pages, int level, uint64_t number,
                                   Ancestors& ancestors) {
   const PageGrid& above = pages.levels[static_cast<size_t>(level + 1)].grid;
   const Index3 child = pages.levels[static_cast<size_t>(level)].grid.index(number);
@@ -183,7 +208,7 @@ Result<page::Parent<T>> parent_of(const Container& container, const auto& pages,
 
 /// The codes of a page, kept or decoded, and those of the coarser ones that this takes.
 template <class T>
-Result<std::shared_ptr<const PageCache::Page>> codes_of(const Container& container, const auto& pages,
+Result<std::shared_ptr<const PageCache::Page>> codes_of(const Container& container, const PackedPages& pages,
                                                         int level, uint64_t number, Ancestors& ancestors) {
   auto& [last_number, last] = ancestors[static_cast<size_t>(level)];
   if (last && last_number == number) return last;
@@ -212,7 +237,7 @@ Result<std::shared_ptr<const PageCache::Page>> codes_of(const Container& contain
 }
 
 template <class T>
-Status decode_box(const Container& container, const PackedVolume& volume, const auto& pages, const Box& box,
+Status decode_box(const Container& container, const PackedVolume& volume, const PackedPages& pages, const Box& box,
                   int level, VoxelSpan out) {
   const auto& l = pages.levels[static_cast<size_t>(level)];
   const PageGrid& grid = l.grid;
@@ -265,7 +290,7 @@ Status decode_box(const Container& container, const PackedVolume& volume, const 
 }
 
 template <class T>
-Result<Voxel> sample_of(const Container& container, const PackedVolume& volume, const auto& pages,
+Result<Voxel> sample_of(const Container& container, const PackedVolume& volume, const PackedPages& pages,
                         Index3 voxel, int level) {
   const PageGrid& grid = pages.levels[static_cast<size_t>(level)].grid;
   const uint64_t number = grid.number(voxel / grid.side);
@@ -286,6 +311,7 @@ Result<Voxel> sample_of(const Container& container, const PackedVolume& volume, 
 
 Status PackedVolume::decode(const Box& box, int level, VoxelSpan out) const {
   if (box.empty()) return {};
+  if (is_color(info_.format)) return decode_colors(*container_, *pages_, params_, box, level, out);
   switch (code_bytes(info_.format)) {
     case 4:
       return decode_box<uint32_t>(*container_, *this, *pages_, box, level, out);
@@ -297,6 +323,7 @@ Status PackedVolume::decode(const Box& box, int level, VoxelSpan out) const {
 }
 
 Result<Voxel> PackedVolume::sample(Index3 voxel, int level) const {
+  if (is_color(info_.format)) return sample_color(*container_, *pages_, params_, voxel, level);
   switch (code_bytes(info_.format)) {
     case 4:
       return sample_of<uint32_t>(*container_, *this, *pages_, voxel, level);
@@ -309,13 +336,15 @@ Result<Voxel> PackedVolume::sample(Index3 voxel, int level) const {
 
 std::optional<Voxel> PackedVolume::uniform(const Box& box, int level) const {
   const auto& l = pages_->levels[static_cast<size_t>(level)];
+  const bool colors = is_color(info_.format);
   const Index3 first = box.lo / l.grid.side, last = (box.hi + (l.grid.side - 1)) / l.grid.side;
   for (int64_t z = first.z; z < last.z; ++z)
     for (int64_t y = first.y; y < last.y; ++y)
       for (int64_t x = first.x; x < last.x; ++x) {
-        const auto bytes = pages_->page(*container_, level, l.grid.number({x, y, z}));
+        const auto bytes = pages_->entry(*container_, level, colors ? l.masks : l.pages, l.grid.number({x, y, z}));
         if (!bytes || !bytes->empty()) return std::nullopt;
       }
+  if (colors) return Voxel{};
   const uint32_t code = l.model->background();
   switch (code_bytes(info_.format)) {
     case 4:

@@ -14,6 +14,7 @@ enum class CodeKind : uint8_t {
   integers = 1,  ///< BITMAP, DENSITY8, DENSITY16: the stored value
   ordered = 2,   ///< FLOAT32: its bits, such that codes ascend as floats do; -0 before 0, NaN at both ends
   steps = 3,     ///< FLOAT32: 0 NaN, 1 and 2 the infinities, c >= 3: lo + (c - 3) step, rounded to a float
+  colors = 4,    ///< RGBA32, RGB24: a mask and channels (color_page.h)
 };
 
 struct ValueMap {

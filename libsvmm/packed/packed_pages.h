@@ -1,0 +1,65 @@
+// The pages of an opened file: where they are, what they are coded with, and those that were used lately.
+#pragma once
+
+#include <array>
+#include <atomic>
+#include <memory>
+#include <optional>
+#include <vector>
+
+#include "libsvmm/packed/color_page.h"
+#include "libsvmm/packed/packed_layout.h"
+#include "libsvmm/packed/page_cache.h"
+
+namespace voxkit::svmm {
+
+/// Chunks of one kind of a level.
+struct PartChunks {
+  uint32_t kind = 0;
+  uint64_t entries = 1;        ///< of a page
+  std::vector<size_t> chunks;  ///< by part: index into the container's table
+  /// Parts whose lengths were found to be right.
+  std::unique_ptr<std::atomic<bool>[]> checked;
+
+  PartChunks() = default;
+  PartChunks(uint32_t kind, uint64_t entries, uint64_t parts);
+};
+
+struct PackedPages {
+  struct Level {
+    PageGrid grid;
+    PartChunks pages, masks;           ///< masks: of colours
+    std::optional<page::Model> model;  ///< of scalars; none: not yet known
+    std::optional<ColorModel> color;   ///< of colours
+  };
+  explicit PackedPages(MemoryBudget& memory) : cache(memory) {}
+
+  std::vector<Level> levels;
+  mutable PageCache cache;  ///< of codes, or of ColorPage
+  mutable std::atomic<uint64_t> decoded{0};
+
+  /// The lengths and entries of a part; ErrorCode::input where it is damaged.
+  Result<PartView> part(const Container& container, int level, const PartChunks& chunks, uint64_t number) const;
+  /// An entry of a page.
+  Result<std::span<const std::byte>> entry(const Container& container, int level, const PartChunks& chunks,
+                                           uint64_t number, uint64_t entry = 0) const;
+  /// Of scalars.
+  Result<std::span<const std::byte>> page(const Container& container, int level, uint64_t number) const {
+    return entry(container, level, levels[static_cast<size_t>(level)].pages, number);
+  }
+};
+
+/// Names the page that is damaged.
+Error at_page(const Container& container, int level, uint64_t number, const PageGrid& grid,
+              const Error& error);
+
+/// The coarser pages that were last used: pages that lie together mostly have the same.
+using Ancestors = std::array<std::pair<uint64_t, std::shared_ptr<const PageCache::Page>>, max_packed_levels>;
+
+/// Of files of colours, as those of PackedVolume.
+Status decode_colors(const Container& container, const PackedPages& pages, const PackedParams& params,
+                     const Box& box, int level, VoxelSpan out);
+Result<Voxel> sample_color(const Container& container, const PackedPages& pages, const PackedParams& params,
+                           Index3 voxel, int level);
+
+}  // namespace voxkit::svmm
