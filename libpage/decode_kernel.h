@@ -41,7 +41,8 @@ template <class Width>
   }
 }
 
-/// Pages have void voxels if `masked`. Calls `row_out(lane number, samples of the row)` for each row of each lane in order.
+/// Pages have void voxels if `masked`. Calls `row_out(lane number, samples of the row)` for each row of each
+/// lane in order.
 template <class Width, int lane_count, bool masked, class RowOut>
 [[gnu::always_inline]] inline void decode_lanes(const ModelData& model, Extent extent,
                                                 std::array<Lane<Width>, lane_count>& lanes,

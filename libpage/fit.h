@@ -16,7 +16,7 @@ struct FitPage {
   Extent extent;
   std::span<const uint32_t> samples;
   std::span<const uint32_t> decoded;
-  Parent<uint32_t> parent{};  ///< of models with parents
+  Parent<uint32_t> parent{};   ///< of models with parents
   const Mask* mask = nullptr;  ///< none: all voxels are solid
 };
 
@@ -26,9 +26,9 @@ class Fit {
  public:
   /// Samples are at most `greatest`; the quantiser's bound is `max_error`.
   Fit(Classes classes, uint32_t greatest, uint32_t max_error);
-  /// One equation for each solid voxel; it counts the less, the further apart its taps are. What was added before
-  /// counts half. `noise` is the variance that the quantiser will add to what is given as decoded (Wiener):
-  /// 0 where that has it already. Parents have it already in any case.
+  /// One equation for each solid voxel; it counts the less, the further apart its taps are. What was added
+  /// before counts half. `noise` is the variance that the quantiser will add to what is given as decoded
+  /// (Wiener): 0 where that has it already. Parents have it already in any case.
   void add(std::span<const FitPage> pages, double noise);
   /// The weights of least squared error for each class.
   std::array<Weights, most_classes> weights() const;

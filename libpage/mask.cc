@@ -10,7 +10,7 @@ namespace {
 constexpr uint32_t version_alone = 1, version_with_parents = 2;
 
 /// Parts of 2048 that solid voxels may have, by number. Number 0 is that of contexts which no sample had.
-constexpr std::array<uint16_t, 32> parts = {1024, 1,    2,    4,    7,    12,   20,   32,   48,   72,  104,
+constexpr std::array<uint16_t, 32> parts = {1024, 1,    2,    4,    7,    12,   20,   32,   48,   72,   104,
                                             148,  208,  288,  392,  528,  700,  900,  1148, 1348, 1520, 1656,
                                             1760, 1840, 1900, 1944, 1976, 2000, 2016, 2028, 2041, 2047};
 constexpr int number_bits = 5, run_golomb = 2;
@@ -215,7 +215,8 @@ Result<Mask> MaskModel::decode(std::span<const std::byte> page, Extent extent,
                                const MaskParent& parent) const {
   if (!extent.valid()) return bad_usage("a mask of no valid extent");
   if (data_->parents && !(parent.mask && covers(parent.extent, parent.x, parent.y, parent.z, extent)))
-    return bad_usage("a mask decoded without the parents of all its voxels: expected those that its model has");
+    return bad_usage(
+        "a mask decoded without the parents of all its voxels: expected those that its model has");
   if (page.empty()) return Mask{};
   if (page.size() == 1) {
     if (page[0] != std::byte{1}) return bad_input({}, "mask: a byte that is not 1");
@@ -228,7 +229,8 @@ Result<Mask> MaskModel::decode(std::span<const std::byte> page, Extent extent,
     const uint32_t part = parts[data_->number[context]];
     const auto slot = static_cast<uint32_t>(coder.state & (table_total - 1));
     const bool solid = slot < part;
-    coder.state = (coder.state >> table_bits) * (solid ? part : table_total - part) + slot - (solid ? 0 : part);
+    coder.state =
+        (coder.state >> table_bits) * (solid ? part : table_total - part) + slot - (solid ? 0 : part);
     coder.renew();
     return solid;
   });

@@ -15,6 +15,8 @@ using Counts = std::array<uint64_t, symbol_count>;
 
 /// Of fitting to what the fit before led to.
 constexpr int most_rounds = 6;
+/// With void voxels: what these become settles slowly.
+constexpr int most_masked_rounds = 12;
 
 /// 256 log2(n), rounded down, of whole numbers alone: the same everywhere. 0 of 0.
 uint64_t log2_256(uint64_t n) {
@@ -85,12 +87,13 @@ std::vector<Counts> count_symbols(const ModelData& model, std::vector<Sampled>& 
 
 /// Bits that symbols take with the best tables, without these, in parts of 256.
 uint64_t cost(const std::vector<Counts>& counts) {
+  static constexpr auto bins = make_bins(32);
   uint64_t bits = 0;
   for (const Counts& table : counts) {
     uint64_t total = 0;
     for (uint32_t s = 0; s < symbol_count; ++s) {
       total += table[s];
-      bits += table[s] * (256 * make_bins(32)[s].raw_bits - log2_256(table[s]));
+      bits += table[s] * (256 * bins[s].raw_bits - log2_256(table[s]));
     }
     bits += total * log2_256(total);
   }
@@ -116,17 +119,22 @@ void fit(ModelData& model, std::vector<Sampled>& pages) {
   double noise = (4 * e * e + 4 * e) / 12;
   std::array<Weights, most_classes> best{};
   std::vector<Counts> best_counts;
+  uint64_t least_cost = 0;
   const bool masked = std::ranges::any_of(pages, [](const Sampled& page) { return page.mask != nullptr; });
-  const int rounds = model.max_error == 0 && !masked ? 1 : most_rounds;
+  const int rounds = masked ? most_masked_rounds : model.max_error != 0 ? most_rounds : 1;
   for (int round = 0; round < rounds; ++round) {
     equations.add(sources, noise);
     noise = 0;
     model.set_weights(equations.weights());
     std::vector<Counts> counts = count_symbols(model, pages);
-    if (round == 0 || cost(counts) < cost(best_counts)) {
+    const uint64_t round_cost = cost(counts);
+    const bool settled = masked && round != 0 && round_cost + least_cost / 256 > least_cost;
+    if (round == 0 || round_cost < least_cost) {
+      least_cost = round_cost;
       best = model.weights;
       best_counts = std::move(counts);
     }
+    if (settled) break;
   }
   model.set_weights(best);
   for (size_t c = 0; c < best_counts.size(); ++c) model.tables[c] = normalise(best_counts[c]);
@@ -173,9 +181,8 @@ Parent<uint32_t> parent_of(const ModelBuilder::Page& page) {
 Result<size_t> size_with(const Model& model, std::span<const ModelBuilder::Page> pages) {
   std::vector<std::byte> bytes = model.serialise();
   for (const ModelBuilder::Page& page : pages)
-    VOX_CHECK(
-        encode_page(model, std::span<const uint32_t>(page.samples), page.extent, bytes, parent_of(page), {},
-                    page.mask ? &*page.mask : nullptr));
+    VOX_CHECK(encode_page(model, std::span<const uint32_t>(page.samples), page.extent, bytes, parent_of(page),
+                          {}, page.mask ? &*page.mask : nullptr));
   return bytes.size();
 }
 

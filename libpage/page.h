@@ -110,8 +110,9 @@ Status encode_page(const Model& model, std::span<const uint32_t> samples, Extent
 
 /// Decodes a page of exactly these bytes into `extent.voxels()` samples. Safe on any bytes: it touches
 /// nothing else, and damage that shows is ErrorCode::input; what was written by then is undefined.
-/// ErrorCode::usage where the type is too narrow for the model, `out` is not of that size, or `parent` or `mask`
-/// are not as when it was encoded; other samples or voxels of these than then are as good as damage to the page.
+/// ErrorCode::usage where the type is too narrow for the model, `out` is not of that size, or `parent` or
+/// `mask` are not as when it was encoded; other samples or voxels of these than then are as good as damage to
+/// the page.
 Status decode_page(const Model& model, std::span<const std::byte> page, Extent extent, std::span<uint8_t> out,
                    const Parent<uint8_t>& parent = {}, const Mask* mask = nullptr);
 Status decode_page(const Model& model, std::span<const std::byte> page, Extent extent,

@@ -59,8 +59,8 @@ constexpr uint32_t first_child(int y, int z) {
 
 /// Whether the parents of all voxels of a page that begin at (x, y, z) of theirs are in it.
 inline bool covers(Extent parents, int x, int y, int z, Extent extent) {
-  return parents.valid() && x >= 0 && y >= 0 && z >= 0 && x < parents.nx && y < parents.ny && z < parents.nz &&
-         x + (extent.nx + 1) / 2 <= parents.nx && y + (extent.ny + 1) / 2 <= parents.ny &&
+  return parents.valid() && x >= 0 && y >= 0 && z >= 0 && x < parents.nx && y < parents.ny &&
+         z < parents.nz && x + (extent.nx + 1) / 2 <= parents.nx && y + (extent.ny + 1) / 2 <= parents.ny &&
          z + (extent.nz + 1) / 2 <= parents.nz;
 }
 /// Whether a page of parents has those of all voxels of a page, and is whole.

@@ -49,7 +49,9 @@ class ColorSurvey {
     const bool difference = channels.greatest(channel) == most_difference;
     for (uint32_t value = 0; value <= channels.greatest(channel); ++value)
       if (difference ? differences_seen_[channel - 1][value]
-                     : bytes_seen_[channel == 0 ? 1 : channel == 1 ? 0 : channel][value])
+                     : bytes_seen_[channel == 0   ? 1
+                                   : channel == 1 ? 0
+                                                  : channel][value])
         out.push_back(value);
     return out;
   }
@@ -59,7 +61,7 @@ class ColorSurvey {
   }
 
  private:
-  size_t bytes_;  ///< of a voxel
+  size_t bytes_;                                                                ///< of a voxel
   std::array<std::array<std::atomic<bool>, 256>, most_channels> bytes_seen_{};  ///< R, G, B, A
   std::array<std::array<std::atomic<bool>, most_difference + 1>, 2> differences_seen_{};
 };
@@ -83,9 +85,8 @@ class DecodedColors {
     ColorParent parent;
     parent.place(child, grid_);
     const uint64_t place = places_[grid_.number(child / int64_t{2})];
-    parent.page = place == none
-                      ? &void_page_
-                      : reinterpret_cast<const ColorPage*>(mapped_->bytes().data()) + place;
+    parent.page =
+        place == none ? &void_page_ : reinterpret_cast<const ColorPage*>(mapped_->bytes().data()) + place;
     return parent;
   }
 

@@ -78,7 +78,8 @@ Status decode_colors(const Container& container, const PackedPages& pages, const
     const uint64_t number = grid.number(at);
     const Box page = grid.box(number), part = intersect(page, box);
     const Index3 to = part.lo - box.lo;
-    const VoxelSpan voxels{out.row(to.y, to.z) + to.x * voxel_bytes(format), out.row_stride, out.slice_stride};
+    const VoxelSpan voxels{out.row(to.y, to.z) + to.x * voxel_bytes(format), out.row_stride,
+                           out.slice_stride};
     VOX_TRY(const auto mask, pages.entry(container, level, l.masks, number));
     if (mask.empty()) {
       fill(voxels, part.size(), format, Voxel{});

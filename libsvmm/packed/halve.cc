@@ -141,13 +141,12 @@ Result<std::unique_ptr<VolumeSource>> halved(VolumeSource& source,
     VOX_CHECK(read_slab(source, slab, voxels, ctx));
     const ConstVoxelSpan read{voxels.data, voxels.row_stride, voxels.slice_stride};
     if (visit) visit(read, slab.size());
-    VOX_CHECK(is_color(info.format)
-                  ? halve_colors(read, slab.size(), static_cast<size_t>(bytes), out->data(), ctx)
-              : info.format == VoxelFormat::float32
-                  ? halve_slab<float>(read, slab.size(), info, out->data(), ctx)
-              : info.format == VoxelFormat::density16
-                  ? halve_slab<uint16_t>(read, slab.size(), info, out->data(), ctx)
-                  : halve_slab<uint8_t>(read, slab.size(), info, out->data(), ctx));
+    VOX_CHECK(
+        is_color(info.format) ? halve_colors(read, slab.size(), static_cast<size_t>(bytes), out->data(), ctx)
+        : info.format == VoxelFormat::float32 ? halve_slab<float>(read, slab.size(), info, out->data(), ctx)
+        : info.format == VoxelFormat::density16
+            ? halve_slab<uint16_t>(read, slab.size(), info, out->data(), ctx)
+            : halve_slab<uint8_t>(read, slab.size(), info, out->data(), ctx));
     VOX_CHECK(
         spool.write({out->data(), static_cast<size_t>(half.x * half.y * ((slab.size().z + 1) / 2) * bytes)}));
   }

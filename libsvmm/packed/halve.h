@@ -9,11 +9,10 @@ namespace voxkit::svmm {
 /// The level above that of `source`, in a temporary file. Of integers the mean of the up to 8 voxels inside
 /// the volume that are not the fill value, halves rounded up; of floats that of those that are numbers,
 /// summed as doubles; of labels and bitmaps the value that most of them have, of several such the least.
-/// Of colours the mean of solid ones, weighted by their alpha, with the mean alpha of all; where that would be
-/// void, and not all are, the least that is not.
-/// Where all are the fill value, or no numbers, so is the mean. `visit`, if given, sees every slab of the
-/// source, packed, in order. Memory: a slab of at least two slices. Errors: those of the source;
-/// ErrorCode::output.
+/// Of colours the mean of solid ones, weighted by their alpha, with the mean alpha of all; where that would
+/// be void, and not all are, the least that is not. Where all are the fill value, or no numbers, so is the
+/// mean. `visit`, if given, sees every slab of the source, packed, in order. Memory: a slab of at least two
+/// slices. Errors: those of the source; ErrorCode::output.
 Result<std::unique_ptr<VolumeSource>> halved(VolumeSource& source,
                                              const std::function<void(ConstVoxelSpan, Index3)>& visit,
                                              Context& ctx);

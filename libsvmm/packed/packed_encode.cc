@@ -247,8 +247,8 @@ class Encoder {
     VOX_CHECK(PageReader(source(level + 1), above, params_, raster(level + 1))
                   .read(parent_number, parent_number + 1, [&](uint64_t, auto codes, page::Extent) -> Status {
                     for (const auto code : codes)
-                      room.push_back(static_cast<T>(
-                          std::min<uint64_t>((code + bound_above) / step * step, std::numeric_limits<T>::max())));
+                      room.push_back(static_cast<T>(std::min<uint64_t>((code + bound_above) / step * step,
+                                                                       std::numeric_limits<T>::max())));
                     return {};
                   }));
     page::Parent<T> parent = placed<T>(child, above);

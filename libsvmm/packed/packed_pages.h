@@ -39,7 +39,8 @@ struct PackedPages {
   mutable std::atomic<uint64_t> decoded{0};
 
   /// The lengths and entries of a part; ErrorCode::input where it is damaged.
-  Result<PartView> part(const Container& container, int level, const PartChunks& chunks, uint64_t number) const;
+  Result<PartView> part(const Container& container, int level, const PartChunks& chunks,
+                        uint64_t number) const;
   /// An entry of a page.
   Result<std::span<const std::byte>> entry(const Container& container, int level, const PartChunks& chunks,
                                            uint64_t number, uint64_t entry = 0) const;

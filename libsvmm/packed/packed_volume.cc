@@ -195,8 +195,8 @@ Result<std::shared_ptr<const PageCache::Page>> codes_of(const Container& contain
 
 /// The parents of a page whose model has them; what holds their samples is kept in `ancestors`.
 template <class T>
-Result<page::Parent<T>> parent_of(const Container& container, const PackedPages& pages, int level, uint64_t number,
-                                  Ancestors& ancestors) {
+Result<page::Parent<T>> parent_of(const Container& container, const PackedPages& pages, int level,
+                                  uint64_t number, Ancestors& ancestors) {
   const PageGrid& above = pages.levels[static_cast<size_t>(level + 1)].grid;
   const Index3 child = pages.levels[static_cast<size_t>(level)].grid.index(number);
   VOX_TRY(const auto codes,
@@ -237,8 +237,8 @@ Result<std::shared_ptr<const PageCache::Page>> codes_of(const Container& contain
 }
 
 template <class T>
-Status decode_box(const Container& container, const PackedVolume& volume, const PackedPages& pages, const Box& box,
-                  int level, VoxelSpan out) {
+Status decode_box(const Container& container, const PackedVolume& volume, const PackedPages& pages,
+                  const Box& box, int level, VoxelSpan out) {
   const auto& l = pages.levels[static_cast<size_t>(level)];
   const PageGrid& grid = l.grid;
   const Index3 first = box.lo / grid.side, last = (box.hi + (grid.side - 1)) / grid.side;
@@ -341,7 +341,8 @@ std::optional<Voxel> PackedVolume::uniform(const Box& box, int level) const {
   for (int64_t z = first.z; z < last.z; ++z)
     for (int64_t y = first.y; y < last.y; ++y)
       for (int64_t x = first.x; x < last.x; ++x) {
-        const auto bytes = pages_->entry(*container_, level, colors ? l.masks : l.pages, l.grid.number({x, y, z}));
+        const auto bytes =
+            pages_->entry(*container_, level, colors ? l.masks : l.pages, l.grid.number({x, y, z}));
         if (!bytes || !bytes->empty()) return std::nullopt;
       }
   if (colors) return Voxel{};

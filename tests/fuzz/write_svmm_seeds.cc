@@ -35,10 +35,13 @@ std::string packed_file(VoxelFormat format, double max_error, int number) {
   std::vector<std::byte> voxels;
   for (int64_t i = 0; i < info.box().voxels(); ++i) {
     const auto value = static_cast<uint16_t>(number % 3 == 0 ? i / 7 % 5 * 11 : i * i / 31 % 200 + i % 3);
-    const Voxel voxel = format == VoxelFormat::float32     ? Voxel::of(static_cast<float>(value) / 8 - 3)
-                        : format == VoxelFormat::density16 ? Voxel::of(static_cast<uint16_t>(value * 9))
-                        : format == VoxelFormat::bitmap    ? Voxel::of(static_cast<uint8_t>(value & 1))
-                                                           : Voxel::of(static_cast<uint8_t>(value));
+    const Voxel voxel =
+        format == VoxelFormat::float32     ? Voxel::of(static_cast<float>(value) / 8 - 3)
+        : format == VoxelFormat::density16 ? Voxel::of(static_cast<uint16_t>(value * 9))
+        : format == VoxelFormat::bitmap    ? Voxel::of(static_cast<uint8_t>(value & 1))
+        : is_color(format)
+            ? Voxel::of(i % 3 == 0 ? 0u : static_cast<uint32_t>(i * 0x010203 % 0xffffff) | 0xff000000u)
+            : Voxel::of(static_cast<uint8_t>(value));
     voxels.insert(voxels.end(), voxel.bytes.begin(), voxel.bytes.begin() + voxel_bytes(format));
   }
   test::MemorySource source(info, voxels);
@@ -119,8 +122,8 @@ int main(int count, char** arguments) {
         ++number;
       }
   number = 0;
-  for (const VoxelFormat format :
-       {VoxelFormat::density8, VoxelFormat::density16, VoxelFormat::float32, VoxelFormat::bitmap})
+  for (const VoxelFormat format : {VoxelFormat::density8, VoxelFormat::density16, VoxelFormat::float32,
+                                   VoxelFormat::bitmap, VoxelFormat::rgba32, VoxelFormat::rgb24})
     for (int i = 0; i < 6; ++i) {
       const double max_error = format == VoxelFormat::bitmap || i < 3 ? 0 : i;
       const std::string file = packed_file(format, max_error, number);

@@ -106,9 +106,11 @@ class ReferenceDecoder {
     }
   }
 
-  std::vector<uint32_t> decode(std::span<const std::byte> page, Extent e,
-                               const ReferenceParent& parent = {}) {
+  /// `solid`, if it is not empty, says of each voxel whether it is coded.
+  std::vector<uint32_t> decode(std::span<const std::byte> page, Extent e, const ReferenceParent& parent = {},
+                               const std::vector<bool>& solid = {}) {
     extent_ = e;
+    solid_ = solid;
     parent_ = parent;
     for (uint32_t& sample : parent_.samples) sample = number_next_to(sample);
     const auto count = static_cast<size_t>(e.voxels());
@@ -208,6 +210,10 @@ class ReferenceDecoder {
     const int64_t predicted = std::clamp<int64_t>(mean >> 12, 0, max_value_);
     const bool mirrored = (mean >> 11 & 1) != 0;
 
+    if (!solid_.empty() && !solid_[index(x, y, z)]) {
+      values_[index(x, y, z)] = predicted;
+      return;
+    }
     const uint64_t folded = decode_symbol(context(x, y, z));
     int64_t residual = static_cast<int64_t>(folded + 1) / 2;
     magnitudes_[index(x, y, z)] = std::min<int64_t>(residual, 255);
@@ -311,6 +317,7 @@ class ReferenceDecoder {
   std::array<std::array<uint64_t, 73>, 192> parts_{};
   ReferenceParent parent_;
   Extent extent_;
+  std::vector<bool> solid_;
   std::vector<int64_t> values_, magnitudes_;
   uint64_t state_ = 1;
   std::span<const std::byte> words_;

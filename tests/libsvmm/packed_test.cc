@@ -11,6 +11,7 @@
 #include "libsvmm/packed/packed_layout.h"
 #include "tests/damage.h"
 #include "tests/libsvmm/packed_attack.h"
+#include "tests/libsvmm/packed_file.h"
 #include "tests/libsvmm/volumes.h"
 
 namespace voxkit::svmm {
@@ -18,53 +19,6 @@ namespace {
 
 using namespace voxkit::svmm::test;
 using voxkit::test::Bytes;
-
-MemoryBudget& memory() {
-  static MemoryBudget budget(uint64_t{1} << 30);
-  return budget;
-}
-Context context(int threads = 2) {
-  Context ctx;
-  ctx.threads = threads;
-  ctx.memory = &memory();
-  return ctx;
-}
-
-struct Written {
-  Bytes bytes;
-  PackedParams params;
-};
-Written encode(VolumeSource& source, const PackedOptions& options, int threads = 2) {
-  Context ctx = context(threads);
-  Written out;
-  const auto params = encode_packed(
-      source, options,
-      [&](std::span<const std::byte> bytes) -> Status {
-        out.bytes.insert(out.bytes.end(), bytes.begin(), bytes.end());
-        return {};
-      },
-      ctx);
-  EXPECT_TRUE(params) << params.error().what;
-  if (params) out.params = *params;
-  return out;
-}
-std::shared_ptr<const PackedVolume> open(const Bytes& file) {
-  const auto bytes = std::make_shared<const Bytes>(file);
-  auto container = Container::open(*bytes, "packed", bytes);
-  EXPECT_TRUE(container) << container.error().what;
-  auto volume = PackedVolume::open(*container, memory());
-  EXPECT_TRUE(volume) << volume.error().what;
-  return volume ? *volume : nullptr;
-}
-Bytes decode(const PackedVolume& volume, int level, const Box& box) {
-  Bytes voxels(static_cast<size_t>(box.voxels() * voxel_bytes(volume.info().format)));
-  const Status status = volume.decode(box, level, packed(voxels.data(), box.size(), volume.info().format));
-  EXPECT_TRUE(status) << status.error().what;
-  return voxels;
-}
-Bytes decode(const PackedVolume& volume, int level = 0) {
-  return decode(volume, level, {{0, 0, 0}, volume.levels()[static_cast<size_t>(level)].dims});
-}
 
 const VoxelFormat scalars[] = {VoxelFormat::density8, VoxelFormat::density16, VoxelFormat::float32,
                                VoxelFormat::bitmap};
@@ -297,7 +251,7 @@ TEST(Packed, WhatIsNotHeldIsRefused) {
     EXPECT_EQ(done.error().code, ErrorCode::usage);
     EXPECT_NE(done.error().what.find(word), std::string::npos) << done.error().what;
   };
-  refused(VoxelFormat::rgba32, {}, "RGBA32");
+  refused(VoxelFormat::rgba32, {.max_error = -1}, "finite");
   refused(VoxelFormat::density8, {.page_side = 12}, "8 or 16");
   refused(VoxelFormat::density8, {.max_error = NAN}, "finite");
   refused(VoxelFormat::density16, {.max_error = 0x1p31 - 1}, "2^31 - 1");

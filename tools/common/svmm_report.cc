@@ -47,6 +47,7 @@ namespace {
 std::string_view name(svmm::CodeKind kind) {
   return kind == svmm::CodeKind::integers  ? "integers"
          : kind == svmm::CodeKind::ordered ? "ordered"
+         : kind == svmm::CodeKind::colors  ? "colors"
                                            : "steps";
 }
 
