@@ -48,7 +48,7 @@ Status Scene::classify(const TransferFunction& transfer, const SceneOptions& opt
 }
 
 FrameJob Scene::job(FrameJob wanted) const {
-  wanted.details |= dag || device || device_dvr;  // where to look colours up, what was hit
+  wanted.details |= dag || masks || device || device_dvr;  // where to look colours up, what was hit
   wanted.costs = device || device_dvr;
   return wanted;
 }
@@ -60,6 +60,7 @@ Status Scene::draw(const Camera& camera, CastOptions options, const DvrOptions& 
   options.range = range;
   if (device) return device->cast(camera, options, frame, ctx);
   if (dag) return cast(*dag, camera, options, frame, ctx);
+  if (masks) return cast(*masks, camera, options, frame, ctx);
   return compressed ? cast(*compressed, camera, options, frame, ctx)
                     : cast(*dense, camera, options, frame, ctx);
 }
@@ -89,6 +90,9 @@ Result<Scene> open_scene(const std::string& name, const SceneOptions& o, Run& ru
     scene.compressed.emplace(input.svmm);
   } else if (input.color) {
     scene.dag.emplace(input.color);
+  } else if (input.packed && !o.backend && render::MaskGrid::fits(*input.packed)) {
+    run.stage("read");
+    VOX_TRY(scene.masks, render::MaskGrid::open(input.packed, run.ctx));
   } else {
     run.stage("read");
     VOX_TRY(scene.dense, DenseGrid::read(*input.source, run.ctx));

@@ -24,9 +24,10 @@ struct SceneOptions {
 /// A volume that is ready to be drawn.
 struct Scene {
   VolumeInfo info;
-  // Surfaces: one of the first three; some on the GPU.
+  // Surfaces: one of the first four; some on the GPU.
   std::optional<render::SvmmGrid> compressed;
   std::optional<render::DagGrid> dag;
+  std::optional<render::MaskGrid> masks;
   std::shared_ptr<const render::DenseGrid> dense;
   std::unique_ptr<const render::DeviceGrid> device;
   ValueRange range{0, 255};  ///< stored values

@@ -5,6 +5,7 @@
 #include "librender/camera.h"
 #include "librender/cast/dag_grid.h"
 #include "librender/cast/grid.h"
+#include "librender/cast/mask_grid.h"
 #include "librender/frame.h"
 
 namespace voxkit::render {
@@ -33,6 +34,9 @@ Status cast(const DenseGrid& grid, const Camera& camera, const CastOptions& opti
 Status cast(const SvmmGrid& grid, const Camera& camera, const CastOptions& options, Frame& frame,
             Context& ctx);
 Status cast(const DagGrid& grid, const Camera& camera, const CastOptions& options, Frame& frame,
+            Context& ctx);
+/// Without levels of detail.
+Status cast(const MaskGrid& grid, const Camera& camera, const CastOptions& options, Frame& frame,
             Context& ctx);
 
 }  // namespace voxkit::render

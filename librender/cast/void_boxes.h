@@ -4,6 +4,7 @@
 
 #include "libcolor/dag/void_search.h"
 #include "librender/cast/dag_grid.h"
+#include "librender/cast/mask_grid.h"
 #include "librender/cast/ray_packet.h"
 #include "librender/cast/void_memo.h"
 #include "libsvmm/every_voxel.h"
@@ -83,6 +84,15 @@ struct DagSpace {
   using Walk = DagCastView<Search::path>::Cursor;
   Walk walk() const { return view.cursor(); }
   auto search() const { return color::VoidSearch(*view.dag, 1024); }
+};
+
+/// Packed volumes of colours as that.
+struct MaskSpace {
+  MaskCastView<Search::path> view;
+
+  using Walk = MaskCastView<Search::path>::Cursor;
+  Walk walk() const { return view.cursor(); }
+  auto search() const { return MaskVoidSearch(*view.tree, 1024); }
 };
 
 /// A compressed volume on the host, searched along a path from the root, with all detail.

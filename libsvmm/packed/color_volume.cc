@@ -1,4 +1,6 @@
 // An opened file of colours.
+#include "formats/parallel.h"
+#include "formats/reservation.h"
 #include "libsvmm/packed/packed_pages.h"
 
 namespace voxkit::svmm {
@@ -103,16 +105,77 @@ Status decode_colors(const Container& container, const PackedPages& pages, const
 }
 
 Result<Voxel> sample_color(const Container& container, const PackedPages& pages, const PackedParams& params,
-                           Index3 voxel, int level) {
+                           Index3 voxel, int level, Ancestors& last) {
   const PageGrid& grid = pages.levels[static_cast<size_t>(level)].grid;
   const uint64_t number = grid.number(voxel / grid.side);
-  Ancestors ancestors;
-  VOX_TRY(const ColorPage* const page, page_of(container, pages, level, number, ancestors));
+  VOX_TRY(const ColorPage* const page, page_of(container, pages, level, number, last));
   const Box box = grid.box(number);
   Voxel out{};
   const Index3 at = voxel - box.lo;
   place_colors(*page, params.channels, box.size(), {at, at + int64_t{1}}, {out.bytes.data(), 4, 4});
   return out;
+}
+
+namespace {
+
+/// The mask of a page; `above`: those of the next coarser level, where it has parents.
+Result<page::Mask> mask_of(const Container& container, const PackedPages& pages, int level, uint64_t number,
+                           const std::vector<page::Mask>& above) {
+  const PackedPages::Level& l = pages.levels[static_cast<size_t>(level)];
+  VOX_TRY(const auto bytes, pages.entry(container, level, l.masks, number));
+  page::MaskParent parent;
+  if (l.color->mask.has_parents()) {
+    const PageGrid& grid = pages.levels[static_cast<size_t>(level + 1)].grid;
+    const Index3 child = l.grid.index(number);
+    ColorParent place;
+    place.place(child, grid);
+    parent = place.mask();
+    parent.mask = &above[grid.number(child / int64_t{2})];
+  }
+  auto mask = l.color->mask.decode(bytes, l.grid.extent(number), parent);
+  if (!mask) return tl::unexpected<Error>(at_page(container, level, number, l.grid, mask.error()));
+  return mask;
+}
+
+}  // namespace
+
+Status visit_masks(const Container& container, const PackedPages& pages,
+                   const std::function<Status(Index3 lo, const page::Mask& mask)>& take, Context& ctx) {
+  int level = 0;
+  while (pages.levels[static_cast<size_t>(level)].color->mask.has_parents()) ++level;
+  std::vector<page::Mask> above;
+  for (; level > 0; --level) {
+    const uint64_t count = pages.levels[static_cast<size_t>(level)].grid.pages();
+    VOX_TRY(const Reservation memory, Reservation::take(count * sizeof(page::Mask), "masks of a level", ctx));
+    std::vector<page::Mask> masks(count);
+    VOX_CHECK(parallel_for(ctx, static_cast<int64_t>(count), [&](int64_t i) -> Status {
+      const auto number = static_cast<uint64_t>(i);
+      VOX_TRY(masks[number], mask_of(container, pages, level, number, above));
+      return {};
+    }));
+    above = std::move(masks);
+  }
+  // One page, or the eight of half that side.
+  const PageGrid& grid = pages.levels[0].grid;
+  const int64_t side = page::max_side / grid.side;
+  const Index3 bricks = (grid.count + (side - 1)) / side;
+  return parallel_for(ctx, bricks.x * bricks.y * bricks.z, [&](int64_t i) -> Status {
+    const Index3 brick(i % bricks.x, i / bricks.x % bricks.y, i / (bricks.x * bricks.y));
+    page::Mask whole;
+    for (int64_t n = 0; n < side * side * side; ++n) {
+      const Index3 in_brick = n == 0 ? Index3(0) : Index3(n & 1, n >> 1 & 1, n >> 2);
+      const Index3 at = brick * side + in_brick;
+      if (glm::any(glm::greaterThanEqual(at, grid.count))) continue;
+      VOX_TRY(const page::Mask mask, mask_of(container, pages, 0, grid.number(at), above));
+      const Index3 corner = in_brick * grid.side;
+      for (int64_t z = 0; z < grid.side; ++z)
+        for (int64_t y = 0; y < grid.side; ++y) {
+          uint16_t& row = whole.row(static_cast<int>(y + corner.y), static_cast<int>(z + corner.z));
+          row = static_cast<uint16_t>(row | mask.row(static_cast<int>(y), static_cast<int>(z)) << corner.x);
+        }
+    }
+    return whole.empty() ? Status() : take(brick * int64_t{page::max_side}, whole);
+  });
 }
 
 }  // namespace voxkit::svmm

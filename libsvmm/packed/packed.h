@@ -7,6 +7,7 @@
 // levels cost little, and decoding a page takes one page of each coarser level.
 #pragma once
 
+#include <functional>
 #include <memory>
 #include <optional>
 #include <vector>
@@ -14,11 +15,13 @@
 #include "formats/container.h"
 #include "formats/context.h"
 #include "formats/source.h"
+#include "libpage/mask.h"
 #include "libsvmm/packed/value_map.h"
 
 namespace voxkit::svmm {
 
 struct PackedPages;
+struct Ancestors;
 
 struct PackedOptions {
   /// No decoded voxel of level 0 is further from its original than this, nor one of another level from the
@@ -94,6 +97,22 @@ class PackedVolume {
   Status decode(const Box& box, int level, VoxelSpan out) const;
   /// One voxel, through a cache of decoded pages.
   Result<Voxel> sample(Index3 voxel, int level = 0) const;
+  /// Of colours: which voxels of level 0 are solid, 16^3 at a time from `lo` on, but for those that are all
+  /// void, in any order, from several threads at once. Decodes masks only. Errors: ErrorCode::input; those of
+  /// `take`.
+  Status visit_masks(const std::function<Status(Index3 lo, const page::Mask& mask)>& take,
+                     Context& ctx) const;
+  /// Voxels of level 0, as sample, for one thread, which asks for neighbours mostly.
+  class Reader {
+   public:
+    explicit Reader(const PackedVolume& volume);
+    ~Reader();
+    Result<Voxel> at(Index3 voxel);
+
+   private:
+    const PackedVolume& volume_;
+    std::unique_ptr<Ancestors> last_;  ///< pages
+  };
   /// The value of the box where its pages take no bytes; nothing where that takes decoding.
   std::optional<Voxel> uniform(const Box& box, int level) const;
   /// Verifies every checksum and decodes every page. Errors name level and page.
@@ -103,6 +122,7 @@ class PackedVolume {
 
  private:
   PackedVolume();
+  Result<Voxel> sample(Index3 voxel, int level, Ancestors& last) const;
   std::shared_ptr<const Container> container_;
   VolumeInfo info_;
   PackedParams params_;

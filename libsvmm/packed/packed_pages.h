@@ -55,12 +55,15 @@ Error at_page(const Container& container, int level, uint64_t number, const Page
               const Error& error);
 
 /// The coarser pages that were last used: pages that lie together mostly have the same.
-using Ancestors = std::array<std::pair<uint64_t, std::shared_ptr<const PageCache::Page>>, max_packed_levels>;
+struct Ancestors
+    : std::array<std::pair<uint64_t, std::shared_ptr<const PageCache::Page>>, max_packed_levels> {};
 
 /// Of files of colours, as those of PackedVolume.
 Status decode_colors(const Container& container, const PackedPages& pages, const PackedParams& params,
                      const Box& box, int level, VoxelSpan out);
 Result<Voxel> sample_color(const Container& container, const PackedPages& pages, const PackedParams& params,
-                           Index3 voxel, int level);
+                           Index3 voxel, int level, Ancestors& last);
+Status visit_masks(const Container& container, const PackedPages& pages,
+                   const std::function<Status(Index3 lo, const page::Mask& mask)>& take, Context& ctx);
 
 }  // namespace voxkit::svmm

@@ -291,11 +291,10 @@ Status decode_box(const Container& container, const PackedVolume& volume, const 
 
 template <class T>
 Result<Voxel> sample_of(const Container& container, const PackedVolume& volume, const PackedPages& pages,
-                        Index3 voxel, int level) {
+                        Index3 voxel, int level, Ancestors& last) {
   const PageGrid& grid = pages.levels[static_cast<size_t>(level)].grid;
   const uint64_t number = grid.number(voxel / grid.side);
-  Ancestors ancestors;
-  VOX_TRY(const auto codes, codes_of<T>(container, pages, level, number, ancestors));
+  VOX_TRY(const auto codes, codes_of<T>(container, pages, level, number, last));
   const Box box = grid.box(number);
   const Index3 at = voxel - box.lo, size = box.size();
   T code;
@@ -323,14 +322,26 @@ Status PackedVolume::decode(const Box& box, int level, VoxelSpan out) const {
 }
 
 Result<Voxel> PackedVolume::sample(Index3 voxel, int level) const {
-  if (is_color(info_.format)) return sample_color(*container_, *pages_, params_, voxel, level);
+  Ancestors last;
+  return sample(voxel, level, last);
+}
+
+PackedVolume::Reader::Reader(const PackedVolume& volume)
+    : volume_(volume), last_(std::make_unique<Ancestors>()) {}
+PackedVolume::Reader::~Reader() = default;
+Result<Voxel> PackedVolume::Reader::at(Index3 voxel) {
+  return volume_.sample(voxel, 0, *last_);
+}
+
+Result<Voxel> PackedVolume::sample(Index3 voxel, int level, Ancestors& last) const {
+  if (is_color(info_.format)) return sample_color(*container_, *pages_, params_, voxel, level, last);
   switch (code_bytes(info_.format)) {
     case 4:
-      return sample_of<uint32_t>(*container_, *this, *pages_, voxel, level);
+      return sample_of<uint32_t>(*container_, *this, *pages_, voxel, level, last);
     case 2:
-      return sample_of<uint16_t>(*container_, *this, *pages_, voxel, level);
+      return sample_of<uint16_t>(*container_, *this, *pages_, voxel, level, last);
     default:
-      return sample_of<uint8_t>(*container_, *this, *pages_, voxel, level);
+      return sample_of<uint8_t>(*container_, *this, *pages_, voxel, level, last);
   }
 }
 
@@ -371,6 +382,13 @@ Status PackedVolume::check(Context& ctx) const {
     }));
   }
   return {};
+}
+
+Status PackedVolume::visit_masks(const std::function<Status(Index3 lo, const page::Mask& mask)>& take,
+                                 Context& ctx) const {
+  if (!is_color(info_.format))
+    return bad_usage(fmt::format("masks of {} voxels: expected colours", name(info_.format)));
+  return svmm::visit_masks(*container_, *pages_, take, ctx);
 }
 
 uint64_t PackedVolume::pages_decoded() const {
