@@ -1,4 +1,7 @@
 // An opened file of colours.
+#include <bit>
+#include <cstring>
+
 #include "formats/parallel.h"
 #include "formats/reservation.h"
 #include "libsvmm/packed/packed_pages.h"
@@ -104,15 +107,65 @@ Status decode_colors(const Container& container, const PackedPages& pages, const
   return {};
 }
 
+namespace {
+
+/// The solid voxels of a page, one after another: most pages of surfaces are small without the void.
+struct SolidPage {
+  page::Mask mask;
+  std::array<uint16_t, page::max_side * page::max_side> before;  ///< solid voxels in earlier rows
+
+  /// Behind it: the colours.
+  const std::byte* colors() const { return reinterpret_cast<const std::byte*>(this + 1); }
+};
+
+std::shared_ptr<const PageCache::Page> solid_page(const ColorPage& page, Channels channels, Index3 size) {
+  const auto solid = static_cast<size_t>(page.mask.count());
+  auto made = std::make_shared<PageCache::Page>(sizeof(SolidPage) + solid * channels.count);
+  auto& out = *reinterpret_cast<SolidPage*>(made->data());
+  out.mask = page.mask;
+  std::byte* to = made->data() + sizeof(SolidPage);
+  std::array<std::byte, page::max_side * most_channels> row;
+  size_t count = 0;
+  for (int64_t z = 0; z < size.z; ++z)
+    for (int64_t y = 0; y < size.y; ++y) {
+      out.before[static_cast<size_t>(z * page::max_side + y)] = static_cast<uint16_t>(count);
+      place_colors(page, channels, size, {{0, y, z}, {size.x, y + 1, z + 1}}, {row.data(), 0, 0});
+      for (uint32_t left = page.mask.row(static_cast<int>(y), static_cast<int>(z)); left != 0;
+           left &= left - 1) {
+        const auto x = static_cast<size_t>(std::countr_zero(left));
+        std::memcpy(to + count++ * channels.count, &row[x * channels.count], channels.count);
+      }
+    }
+  return made;
+}
+
+}  // namespace
+
 Result<Voxel> sample_color(const Container& container, const PackedPages& pages, const PackedParams& params,
                            Index3 voxel, int level, Ancestors& last) {
   const PageGrid& grid = pages.levels[static_cast<size_t>(level)].grid;
   const uint64_t number = grid.number(voxel / grid.side);
-  VOX_TRY(const ColorPage* const page, page_of(container, pages, level, number, last));
-  const Box box = grid.box(number);
+  const PageCache::Key key{~level, number};  // beside ColorPage, which parents are kept as
+  auto& [last_key, kept] = last.solid;
+  if (!kept || last_key != key) {
+    auto found = pages.cache.find(key);
+    if (!found) {
+      const auto room = std::make_unique<ColorPage>();
+      VOX_CHECK(decode_page_of(container, pages, level, number, last, *room));
+      found = solid_page(*room, params.channels, grid.box(number).size());
+      pages.cache.keep(key, found);
+    }
+    last_key = key;
+    kept = std::move(found);
+  }
+  const auto& page = *reinterpret_cast<const SolidPage*>(kept->data());
+  const Index3 at = voxel % grid.side;
+  const uint32_t row = page.mask.row(static_cast<int>(at.y), static_cast<int>(at.z));
   Voxel out{};
-  const Index3 at = voxel - box.lo;
-  place_colors(*page, params.channels, box.size(), {at, at + int64_t{1}}, {out.bytes.data(), 4, 4});
+  if ((row >> at.x & 1) == 0) return out;
+  const size_t place = page.before[static_cast<size_t>(at.z * page::max_side + at.y)] +
+                       static_cast<size_t>(std::popcount(row & ((1u << at.x) - 1)));
+  std::memcpy(out.bytes.data(), page.colors() + place * params.channels.count, params.channels.count);
   return out;
 }
 

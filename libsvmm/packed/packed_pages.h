@@ -56,7 +56,10 @@ Error at_page(const Container& container, int level, uint64_t number, const Page
 
 /// The coarser pages that were last used: pages that lie together mostly have the same.
 struct Ancestors
-    : std::array<std::pair<uint64_t, std::shared_ptr<const PageCache::Page>>, max_packed_levels> {};
+    : std::array<std::pair<uint64_t, std::shared_ptr<const PageCache::Page>>, max_packed_levels> {
+  /// Of colours, the page that a voxel was asked of last, without what is void.
+  std::pair<PageCache::Key, std::shared_ptr<const PageCache::Page>> solid;
+};
 
 /// Of files of colours, as those of PackedVolume.
 Status decode_colors(const Container& container, const PackedPages& pages, const PackedParams& params,

@@ -56,7 +56,7 @@ Result<std::unique_ptr<VolumeSource>> open_surface(const Options& o, Context& ct
     VOX_TRY(const cli::Input again, cli::open_input(o.input, o.open, ctx));
     VOX_TRY(range, measure_range(*again.source, ctx));
   }
-  const double iso = o.iso + info.bias();
+  const double iso = o.iso + static_cast<double>(info.bias());
   return std::make_unique<OpaqueSource>(std::move(input.source), iso, range);
 }
 
@@ -82,6 +82,21 @@ Result<Compressed> compress(const Options& o, double quality, Context& ctx) {
   VOX_TRY(compressed.volume, svmm::Volume::open(std::move(container)));
   compressed.bytes = bytes->size();
   return compressed;
+}
+
+/// In layout packed, without levels.
+Result<std::pair<MaskGrid, uint64_t>> compress_packed(const Options& o, Context& ctx) {
+  VOX_TRY(const auto source, open_surface(o, ctx));
+  const auto bytes = std::make_shared<std::vector<std::byte>>();
+  const ByteSink append = [&](std::span<const std::byte> more) -> Status {
+    bytes->insert(bytes->end(), more.begin(), more.end());
+    return {};
+  };
+  VOX_CHECK(svmm::encode_packed(*source, {.levels = false}, append, ctx));
+  VOX_TRY(auto container, Container::open(*bytes, o.input, bytes));
+  VOX_TRY(auto volume, svmm::PackedVolume::open(std::move(container), *ctx.memory));
+  VOX_TRY(auto grid, MaskGrid::open(std::move(volume), ctx));
+  return std::pair{std::move(grid), uint64_t{bytes->size()}};
 }
 
 struct CompressedSurface {
@@ -124,6 +139,7 @@ struct Contender {
 
 std::vector<Contender> contenders(const Compressed& lossless, const Compressed& lossy,
                                   const CompressedSurface& surface,
+                                  const std::pair<MaskGrid, uint64_t>& packed,
                                   const std::shared_ptr<const NanovdbGrid>& peer, const Options& o,
                                   Context& ctx) {
   std::vector<Contender> all;
@@ -143,6 +159,7 @@ std::vector<Contender> contenders(const Compressed& lossless, const Compressed& 
   add_ours("svmm, lossless", SvmmGrid(lossless.volume), lossless.bytes);
   add_ours("svmm, quality 80", SvmmGrid(lossy.volume), lossy.bytes);
   add_ours("DAG, colours looked up", DagGrid(surface.volume), surface.bytes);
+  add_ours("svmm packed, lossless, colours looked up", packed.first, packed.second);
   const auto hits = std::make_shared<std::vector<Hit>>();
   const auto add_peer = [&](std::string name, CastFunction* cast_function, March march, bool doubles) {
     const auto cast_frame = [=, &o, &ctx](const Camera& camera, Voxels& voxels) -> Result<double> {
@@ -197,11 +214,12 @@ Result<int> work(const Options& o, cli::Run& run) {
   VOX_TRY(const Compressed lossless, compress(o, 100, run.ctx));
   VOX_TRY(const Compressed lossy, compress(o, 80, run.ctx));
   VOX_TRY(const CompressedSurface surface, compress_surface(o, run.ctx));
+  VOX_TRY(const auto packed, compress_packed(o, run.ctx));
   run.stage("NanoVDB");
   VOX_TRY(const auto source, open_surface(o, run.ctx));
   VOX_TRY(const auto peer, NanovdbGrid::build(*source, run.ctx));
   run.stage("cast");
-  auto all = contenders(lossless, lossy, surface, peer, o, run.ctx);
+  auto all = contenders(lossless, lossy, surface, packed, peer, o, run.ctx);
   VOX_CHECK(run_all(all, cameras, o, run.ctx));
 
   const double frame_rays = static_cast<double>(o.width) * static_cast<double>(o.height);
