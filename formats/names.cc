@@ -3,6 +3,7 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <filesystem>
 
 namespace voxkit {
 namespace {
@@ -78,6 +79,14 @@ Result<NumberedName> numbered_name(const std::string& text) {
   }
   if (!found) return wrong();
   return pattern;
+}
+
+bool leaves_folder(const std::string& folder, const std::string& name) {
+  namespace fs = std::filesystem;
+  const fs::path path = fs::path(name).lexically_normal();
+  const fs::path base = fs::absolute(folder.empty() ? "." : folder).lexically_normal();
+  const fs::path inside = path.is_absolute() ? path.lexically_relative(base) : path;
+  return inside.empty() || *inside.begin() == "..";
 }
 
 }  // namespace voxkit

@@ -34,4 +34,8 @@ bool is_numbered(std::string_view name);
 /// other %, a second %d, a width without its 0, or one above 18.
 Result<NumberedName> numbered_name(const std::string& name);
 
+/// Whether a name that a file in `folder` has for another file leads out of that folder: an absolute one to
+/// elsewhere, or one with more ".." than folders before them. Names decide, and not where links lead.
+bool leaves_folder(const std::string& folder, const std::string& name);
+
 }  // namespace voxkit

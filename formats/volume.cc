@@ -43,6 +43,10 @@ VoxelFormat scalar_format(SampleType t) {
   }
 }
 
+std::string_view type_name(const VolumeInfo& info) {
+  return !is_color(info.format) && is_wide(info.sample_type) ? name(info.sample_type) : name(info.format);
+}
+
 std::optional<uint64_t> checked_voxels(Index3 dims) {
   uint64_t product = 1;
   for (int axis = 0; axis < 3; ++axis) {

@@ -205,6 +205,10 @@ struct VolumeInfo {
   }
 };
 
+/// What people call voxels: of wide integers their own type, such as "i32", however they are held; else the
+/// name of the format.
+std::string_view type_name(const VolumeInfo& info);
+
 /// dims.x * dims.y * dims.z, or nothing if a side is outside 1..2^31 or the product exceeds 2^62.
 std::optional<uint64_t> checked_voxels(Index3 dims);
 /// Bytes of a volume uncompressed: voxels * voxel_bytes, or one bit a voxel (rounded up to bytes) for BITMAP.

@@ -271,6 +271,7 @@ VolumeDiff summarise(const Sums& sums, const VolumeInfo& a, int channels, std::o
   diff.dims = a.dims;
   diff.voxels = *checked_voxels(a.dims);
   diff.voxel_format = a.format;
+  diff.type_name = type_name(a);
   const ValueRange samples = sums.lo <= sums.hi ? ValueRange{sums.lo, sums.hi} : ValueRange{0, 0};
   diff.peak = peak ? *peak : full_scale(a, {a.stored(samples.lo), a.stored(samples.hi)});
   const double voxels = static_cast<double>(diff.voxels), samples_count = voxels * channels;
@@ -360,8 +361,8 @@ Result<VolumeDiff> diff_volumes(VolumeSource& a, VolumeSource& b, std::optional<
                                  p.x, p.y, p.z, q.x, q.y, q.z));
   }
   if (is_color(info.format) != is_color(b.info().format))
-    return bad_usage(fmt::format("{} cannot be compared with {}: convert one of them first",
-                                 name(info.format), name(b.info().format)));
+    return bad_usage(fmt::format("{} cannot be compared with {}: convert one of them first", type_name(info),
+                                 type_name(b.info())));
 
   const VolumeInfo error_info = error_volume_info(info, b.info());
   const int error_bytes = voxel_bytes(error_info.format);

@@ -16,6 +16,7 @@ struct VolumeDiff {
   Index3 dims{0};
   uint64_t voxels = 0;
   VoxelFormat voxel_format{};  ///< of A
+  std::string_view type_name;  ///< of A, as type_name() says it
   double peak = 0;             ///< full_scale(A), or what the caller said
   double mse = 0, rmse = 0;    ///< over all samples, alpha included
   double psnr_db = 0;          ///< 10 log10(peak^2 / mse); infinite where nothing differs

@@ -115,7 +115,8 @@ class Encoder {
         levels_(plan_levels(info_, params)),
         reservation_(*ctx.memory) {
     if (levels_.size() == 1) params_.base = Base::raw;
-    if (info_.fill && F != VoxelFormat::float32 && !is_color(F))
+    criterion_.labels = info_.is_labels;
+    if (info_.fill && !info_.is_labels && (F == VoxelFormat::density8 || F == VoxelFormat::density16))
       criterion_.fill = static_cast<int64_t>(*info_.fill);
     for (uint32_t k = 0; k < levels_.size(); ++k) writers_.emplace_back(container_, k, levels_[k]);
   }
@@ -167,6 +168,17 @@ class Encoder {
                            "two slabs of the input"));
     const uint64_t tile = edge * edge * edge * bytes;
     // A batch's blocks take at most about twice the voxels; its nodes are gone by then.
+    if (criterion_.labels && has_commonest<F>) {
+      uint64_t most = 0;  // values that are counted at once
+      for (size_t k = 0; k + 1 < levels_.size(); ++k) {
+        const uint64_t w = levels_[k].blockwidth,
+                       voxels = checked_voxels(levels_[k].dims).value_or(most_voxels);
+        most = std::max(most, std::min(w * w * w, voxels));
+      }
+      VOX_CHECK(reservation_.add(static_cast<uint64_t>(ctx_.threads) *
+                                     Commonest::bytes(most, F == VoxelFormat::float32 ? most : 65536),
+                                 "counts of labels"));
+    }
     const uint64_t w = levels_[0].blockwidth;
     const uint64_t nodes = edge * edge * edge / (w * w * w) * sizeof(Node<F>);
     VOX_CHECK(reservation_.add(static_cast<uint64_t>(ctx_.threads) * (tile + 2 * nodes) +

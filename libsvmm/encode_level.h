@@ -5,6 +5,7 @@
 #include <vector>
 
 #include "libsvmm/base_block.h"
+#include "libsvmm/commonest.h"
 #include "libsvmm/layout.h"
 #include "libsvmm/moments.h"
 
@@ -13,11 +14,25 @@ namespace voxkit::svmm {
 /// An equivalent voxel while its level is being made.
 template <VoxelFormat F>
 struct Node {
-  Moments<F> moments;  ///< of the original voxels it stands for; count 0: outside the volume
+  Moments<F> moments;  ///< of the original voxels it stands for; empty: outside the volume
   Voxel value;         ///< their average, as it will be decoded
   uint64_t block = 0;  ///< of the block below; meaningful if not terminal
   bool terminal = true;
 };
+
+/// Whether sets of a format's voxels may have their commonest in place of an average: of a BITMAP its
+/// coverage, rounded, is as much.
+template <VoxelFormat F>
+inline constexpr bool has_commonest = !is_color(F) && F != VoxelFormat::bitmap;
+
+/// The commonest of the values that `visit(add)` adds with add(voxel bytes, times).
+template <VoxelFormat F, class Visit>
+Voxel commonest(const Visit& visit) {
+  thread_local Commonest counts;
+  counts.clear();
+  visit([&](const std::byte* v, uint64_t times) { counts.add(Moments<F>::key(Moments<F>::load(v)), times); });
+  return Voxel::of(Moments<F>::from_key(counts.key()));
+}
 
 /// The stored blocks of one level, in order. Block numbers, and links to them, count from the buffer's own
 /// start until they are committed to the file.
@@ -68,7 +83,7 @@ uint64_t write_structural_block(const NodeGrid<F>& grid, Index3 lo, Index3 size,
         Voxel subblock[8];
         for (int i = 0; i < 8; ++i) {
           const Node<F>* node = grid.find(lo + Index3(x + (i & 1), y + (i >> 1 & 1), z + (i >> 2)));
-          if (!node || node->moments.count == 0) continue;
+          if (!node || node->moments.empty()) continue;
           subblock[i] = node->value;
           terminal_voxels += node->terminal;
           if (node->terminal) continue;
@@ -107,13 +122,22 @@ void encode_block(const NodeGrid<F>& grid, const Index3& lo, const Index3& level
     for (int64_t y = lo.y; y < hi.y; ++y)
       for (int64_t x = lo.x; x < hi.x; ++x) {
         const Node<F>& node = *grid.find({x, y, z});
-        padding |= node.moments.count == 0;
-        if (node.moments.count == 0) continue;
+        padding |= node.moments.empty();
+        if (node.moments.empty()) continue;
         parent.moments.add(node.moments);
         all_terminal &= node.terminal;
       }
-  if (parent.moments.count == 0) return;
+  if (parent.moments.empty()) return;
   parent.value = parent.moments.value(criterion);
+  if constexpr (has_commonest<F>)
+    if (criterion.labels)
+      parent.value = commonest<F>([&](const auto& add) {
+        for (int64_t z = lo.z; z < hi.z; ++z)
+          for (int64_t y = lo.y; y < hi.y; ++y)
+            for (int64_t x = lo.x; x < hi.x; ++x)
+              if (const Node<F>& node = *grid.find({x, y, z}); !node.moments.empty())
+                add(node.value.bytes.data(), node.moments.count);
+      });
   bool homogeneous = all_terminal && (!criterion.global || parent.moments.within(parent.value, criterion));
   if (padding && criterion.layout == Layout::thesis)
     homogeneous &= Moments<F>::near(Voxel{}.bytes.data(), parent.value, criterion);
@@ -124,7 +148,7 @@ void encode_block(const NodeGrid<F>& grid, const Index3& lo, const Index3& level
           const Node<F>& node = *grid.find({x, y, z});
           const Voxel decoded = decoded_value(node.value, F);
           homogeneous =
-              node.moments.count == 0 || Moments<F>::near(decoded.bytes.data(), parent.value, criterion);
+              node.moments.empty() || Moments<F>::near(decoded.bytes.data(), parent.value, criterion);
         }
   if (homogeneous) return;
   parent.terminal = false;
@@ -201,7 +225,15 @@ void encode_base_block(const ConstVoxelSpan& voxels, const Index3& valid, int w,
       return true;
     });
   }
-  const Voxel value = moments.value(criterion);
+  Voxel value = moments.value(criterion);
+  if constexpr (has_commonest<F>)
+    if (criterion.labels && !moments.uniform())
+      value = commonest<F>([&](const auto& add) {
+        every([&](const std::byte* v) {
+          add(v, 1);
+          return true;
+        });
+      });
   parent.moments = moments;
   parent.value = value;
   bool homogeneous = moments.within(value, criterion);

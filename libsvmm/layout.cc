@@ -47,12 +47,20 @@ Status validate(const Params& params, const VolumeInfo& info) {
     return bad_usage(fmt::format("full scale {}: expected a number above 0", params.full_scale));
   if (params.layout == Layout::thesis && !is_color(f) && f != VoxelFormat::density8)
     return bad_usage(fmt::format(
-        "--layout thesis: {} has no published layout: expected RGBA32, RGB24 or DENSITY8", name(f)));
+        "--layout thesis: {} has no published layout: expected RGBA32, RGB24 or DENSITY8", type_name(info)));
   if (params.base == Base::alpha && f != VoxelFormat::rgba32)
-    return bad_usage(fmt::format("--base alpha: {} has no alpha: expected RGBA32", name(f)));
+    return bad_usage(fmt::format("--base alpha: {} has no alpha: expected RGBA32", type_name(info)));
   if ((params.base == Base::gray || params.base == Base::bc1) && !is_color(f))
     return bad_usage(fmt::format("--base {}: {} has no colour: expected RGBA32 or RGB24",
-                                 params.base == Base::gray ? "gray" : "bc1", name(f)));
+                                 params.base == Base::gray ? "gray" : "bc1", type_name(info)));
+  if ((info.is_labels || info.labels) &&
+      (params.delta > 0 || params.base != Base::raw || params.layout != Layout::plain))
+    return bad_usage(
+        info.is_labels
+            ? "labels have no values between them: expected --quality 100, with --layout plain and "
+              "--base raw, or --layout packed"
+            : "values that are 65536 and more apart are held by a table, which has no steps: expected "
+              "--quality 100, with --layout plain and --base raw, or --layout packed");
   if (params.base == Base::bc1 && blockwidth(params, 0) < 4)
     return bad_usage(
         "--base bc1: tiles of 4x4 voxels need a base blockwidth of 4 or more: use --blockwidth 4, say");

@@ -31,6 +31,7 @@ struct Criterion {
   int64_t scalar;   ///< itself, rounded down (integer scalars)
   Layout layout;
   bool alpha_weight, global;
+  bool labels = false;  ///< scalars that are names: in place of an average they have their commonest
   /// Integer scalars: the stored value that stands for nothing measured; -1: none. It has no part in
   /// averages, and is near to itself only.
   int64_t fill = -1;
@@ -79,6 +80,7 @@ requires(is_color(F)) struct Moments<F> {
     one.count = n;
     add(one);
   }
+  bool empty() const { return count == 0; }
   bool uniform() const { return std::equal(lo, lo + channels, hi); }
   /// The average as it will be decoded.
   Voxel value(const Criterion& criterion) const {
@@ -143,9 +145,11 @@ requires(F == VoxelFormat::density8 || F == VoxelFormat::density16 ||
   using Value = std::conditional_t<F == VoxelFormat::density16, uint16_t, uint8_t>;
   uint64_t count = 0, sum = 0;
   Value lo = static_cast<Value>(-1), hi = 0;
-  uint64_t fills = 0;  ///< voxels of the fill value, which are counted here only
+  uint64_t fills = 0;  ///< voxels of the fill value: in the volume, but counted here only
 
   static Value load(const std::byte* v) { return load_le<Value>(v); }
+  static uint32_t key(Value x) { return x; }
+  static Value from_key(uint32_t k) { return static_cast<Value>(k); }
   void add(const std::byte* v, int64_t n, const Criterion& criterion) {
     if (criterion.fill >= 0) {
       for (int64_t i = 0; i < n; ++i)
@@ -182,6 +186,7 @@ requires(F == VoxelFormat::density8 || F == VoxelFormat::density16 ||
     else
       add(Moments{n, x * n, x, x, 0});
   }
+  bool empty() const { return count == 0 && fills == 0; }
   bool uniform() const { return fills == 0 ? lo == hi : count == 0; }
   Voxel value(const Criterion& criterion) const {
     if (count == 0) return Voxel::of(static_cast<Value>(std::max<int64_t>(criterion.fill, 0)));
@@ -208,6 +213,8 @@ struct Moments<VoxelFormat::float32> {
   double sum = 0;
   uint32_t lo = ~uint32_t{0}, hi = 0;
 
+  using Value = float;
+  static Value load(const std::byte* v) { return load_le<float>(v); }
   static uint32_t key(float x) {
     const auto bits = std::bit_cast<uint32_t>(x);
     return bits & 0x80000000u ? ~bits : bits | 0x80000000u;
@@ -235,6 +242,7 @@ struct Moments<VoxelFormat::float32> {
     add(Moments{n, is_finite ? n : 0, is_finite ? static_cast<double>(x) * static_cast<double>(n) : 0, key(x),
                 key(x)});
   }
+  bool empty() const { return count == 0; }
   bool uniform() const { return lo == hi; }
   Voxel value(const Criterion&) const {
     if (uniform()) return Voxel::of(from_key(lo));

@@ -89,7 +89,9 @@ uint64_t thesis_bytes(std::span<const Level> levels);
 
 /// Compresses `source` into a container written to `sink`, in one pass over the source. Memory: a few slabs
 /// of max(32, 2 w_0) slices if the source is forward only, else a few tiles of that width; plus a slab of
-/// each higher level. The bytes written do not depend on ctx.threads. Returns the levels. Errors:
+/// each higher level. Of labels (VolumeInfo::is_labels) an equivalent voxel is the commonest of the values
+/// below it, and not an average; they are lossless only. The bytes written do not depend on ctx.threads.
+/// Returns the levels. Errors:
 /// - ErrorCode::usage: those of `validate`.
 /// - ErrorCode::limit: more than `most_voxels`; more than 2^32 blocks in a level of Layout::thesis; more
 ///   memory than ctx.memory allows.

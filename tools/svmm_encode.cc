@@ -219,13 +219,11 @@ Result<int> work(const Options& o, Run& run) {
   VOX_TRY(auto source, inputs.open(o.verify || (!lossless && !o.range)));
   VOX_TRY(svmm::Params params, params_of(o, source->info().format));
   VOX_CHECK(svmm::validate(params, source->info()));
-  if (source->info().is_labels)
-    return bad_usage(
-        "labels have no averages, which coarser levels are made of: expected vq-encode for them");
   const VoxelFormat format = source->info().format;
   if (o.range && format != VoxelFormat::density16 && format != VoxelFormat::float32)
-    return bad_usage(fmt::format(
-        "--range: {} voxels have a full scale of their own: expected 16 bit or float voxels", name(format)));
+    return bad_usage(
+        fmt::format("--range: {} voxels{} have a full scale of their own: expected 16 bit or float voxels",
+                    type_name(source->info()), source->info().has_wide_base() ? ", held in 8 bits," : ""));
   VOX_TRY(params.full_scale, scale_of(o, lossless, source, inputs, run));
   const VolumeInfo info = source->info();
 

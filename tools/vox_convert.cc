@@ -104,7 +104,7 @@ Result<int> work(Options& o, Run& run) {
   VOX_CHECK(sink->finish());
 
   run.note(fmt::format("{}: {} x {} x {} voxels of {} in {:.2f} s", o.output, info.dims.x, info.dims.y,
-                       info.dims.z, name(info.format), run.seconds()));
+                       info.dims.z, type_name(info), run.seconds()));
   if (run.options.json) {
     Json json = Json::result();
     json.set("tool", run.tool).set("version", version_text()).set("input", o.input).set("output", o.output);

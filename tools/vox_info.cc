@@ -135,6 +135,16 @@ std::string compression_text(const Container& container) {
                      stored, plain);
 }
 
+/// The type of voxels, and of integers that are held in fewer bits than they have in how many: so many are
+/// the raw bytes.
+std::string type_text(const VolumeInfo& info) {
+  const std::string_view type = type_name(info);
+  if (is_color(info.format)) return std::string(type);
+  if (!is_wide(info.sample_type)) return fmt::format("{} ({})", type, voxkit::name(info.sample_type));
+  if (!info.has_wide_base()) return fmt::format("{} (held in floats of 32 bits)", type);
+  return fmt::format("{} (held in {} bits)", type, 8 * voxel_bytes(info.format));
+}
+
 /// Where the volume is: in a line, and another one where its axes are not those of the world.
 std::string place_text(const VolumeInfo& info) {
   const Affine& at = info.affine;
@@ -156,9 +166,8 @@ std::string place_text(const VolumeInfo& info) {
 std::string text_of(const Options& o, const Input& input, std::optional<uint64_t> bytes) {
   const VolumeInfo& info = input.source->info();
   std::string text = fmt::format("{}: {}\n", o.file, format_of(o.file, input));
-  text += fmt::format("voxels      {} x {} x {} {}", info.dims.x, info.dims.y, info.dims.z,
-                      voxkit::name(info.format));
-  text += is_color(info.format) ? "\n" : fmt::format(" ({})\n", voxkit::name(info.sample_type));
+  text +=
+      fmt::format("voxels      {} x {} x {} {}\n", info.dims.x, info.dims.y, info.dims.z, type_text(info));
   text += place_text(info);
   if (info.slope != 1 || info.intercept != 0)
     text += fmt::format("real value  {:.6g} * sample + {:.6g}\n", info.slope, info.intercept);

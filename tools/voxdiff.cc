@@ -2,10 +2,12 @@
 #include <fmt/core.h>
 
 #include <algorithm>
+#include <cmath>
 #include <filesystem>
 #include <limits>
 #include <vector>
 
+#include "formats/fill.h"
 #include "formats/image/image.h"
 #include "formats/names.h"
 #include "formats/volume/open_volume.h"
@@ -93,7 +95,7 @@ Json describe(const VolumeDiff& d, const ErrorHistogram& histogram, const Run& r
 
 std::string readable_lines(const VolumeDiff& d) {
   std::string text =
-      fmt::format("voxels            {} x {} x {} {}\n", d.dims.x, d.dims.y, d.dims.z, name(d.voxel_format));
+      fmt::format("voxels            {} x {} x {} {}\n", d.dims.x, d.dims.y, d.dims.z, d.type_name);
   text += fmt::format("differing voxels  {} ({:.4g} %)\n", d.differing_voxels,
                       100 * static_cast<double>(d.differing_voxels) / static_cast<double>(d.voxels));
   text += fmt::format("PSNR              {} dB (peak {})\n", readable(d.psnr_db), readable(d.peak));
@@ -107,14 +109,35 @@ std::string readable_lines(const VolumeDiff& d) {
   return text;
 }
 
+/// Where one volume of floats says which value stands for nothing measured and the other does not, it is that
+/// of both: such voxels are NaN on one side, and the same measurement is no infinite error. Beside integers
+/// it is the value that counts.
+void share_fill(std::unique_ptr<VolumeSource>& from, const std::string& from_name,
+                std::unique_ptr<VolumeSource>& to, const std::string& to_name, Run& run) {
+  const VolumeInfo &said = from->info(), &other = to->info();
+  if (said.format != VoxelFormat::float32 || !said.fill || std::isnan(*said.fill) || is_color(other.format))
+    return;
+  const double fill = *said.fill;
+  if (other.format != VoxelFormat::float32) {
+    from = fill_restored(std::move(from));
+    return;
+  }
+  if (other.fill) return;
+  run.say(fmt::format("{}: the value {:.9g} is taken as its fill value, as it is that of {}", to_name, fill,
+                      from_name));
+  to = with_fill(std::move(to), fill);
+}
+
 Result<int> compare_volumes(const Options& o, Run& run) {
   if (o.fail_ms_ssim) return bad_usage("--fail-ms-ssim is for images: A and B are volumes");
   if (o.space != "srgb") return bad_usage("--space lab is for images: A and B are volumes");
   OpenOptions open = o.open;
   if (!o.errors.empty())
     open.outputs = is_numbered(o.errors) ? std::vector{o.errors} : files_of_output(o.errors);
-  VOX_TRY(const Input a, open_input(o.a, open, run.ctx));
-  VOX_TRY(const Input b, open_input(o.b, open, run.ctx));
+  VOX_TRY(Input a, open_input(o.a, open, run.ctx));
+  VOX_TRY(Input b, open_input(o.b, open, run.ctx));
+  share_fill(a.source, o.a, b.source, o.b, run);
+  share_fill(b.source, o.b, a.source, o.a, run);
   const VolumeInfo& info_a = a.source->info();
   const VolumeInfo& info_b = b.source->info();
   if (info_a.dims != info_b.dims) {

@@ -134,7 +134,7 @@ Result<int> work(const Options& o, Run& run) {
   if (o.lossless && bound > 0)
     return bad_usage(
         fmt::format("--lossless: {} voxels are quantised to 65536 levels: leave it out, or use --max-error",
-                    name(info.format)));
+                    type_name(info)));
 
   VOX_TRY(auto out, OutputFile::create(o.output, run.options.force));
   options.clustering = [&run] { run.stage("k-means"); };

@@ -5,7 +5,6 @@
 #include <algorithm>
 #include <array>
 #include <cstring>
-#include <filesystem>
 #include <utility>
 
 #include "formats/little_endian.h"
@@ -91,7 +90,7 @@ Result<const Buffers::Loaded*> Buffers::buffer(uint32_t index) {
       loaded.bytes = *owned;
       loaded.owner = owned;
     } else {
-      const std::string file = find_picture(std::filesystem::path(path_).parent_path().string(), *buffer.uri);
+      VOX_TRY(const std::string file, folder_.find(*buffer.uri, "buffer"));
       if (file.empty())
         return bad_input(path_, fmt::format("{} is missing, which the mesh needs",
                                             buffer.uri->substr(buffer.uri->rfind('/') + 1, 200)));

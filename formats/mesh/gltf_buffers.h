@@ -22,8 +22,13 @@ struct Values {
 class Buffers {
  public:
   Buffers(const Document& document, std::span<const std::byte> own_bytes, std::shared_ptr<const void> owner,
-          const std::string& path, Context& ctx)
-      : document_(document), own_bytes_(own_bytes), owner_(std::move(owner)), path_(path), ctx_(ctx) {}
+          const std::string& path, MeshFolder& folder, Context& ctx)
+      : document_(document),
+        own_bytes_(own_bytes),
+        owner_(std::move(owner)),
+        path_(path),
+        folder_(folder),
+        ctx_(ctx) {}
 
   /// Opens files and unpacks text; each when first asked for.
   Result<std::span<const std::byte>> view(uint32_t index);
@@ -52,6 +57,7 @@ class Buffers {
   std::span<const std::byte> own_bytes_;
   std::shared_ptr<const void> owner_;
   const std::string& path_;
+  MeshFolder& folder_;
   Context& ctx_;
   std::vector<Loaded> buffers_, views_;
 };

@@ -311,12 +311,12 @@ class SceneReader {
 
 }  // namespace
 
-Result<MeshParts> read_gltf(const std::string& path, Context& ctx) {
+Result<MeshParts> read_gltf(const std::string& path, MeshFolder& folder, Context& ctx) {
   VOX_TRY(const auto file, MappedFile::open(path));
   VOX_TRY(const GltfParts parts, parts_of(file->bytes(), path));
   const auto own_bytes = parts.own_bytes ? std::optional<uint64_t>(parts.own_bytes->size()) : std::nullopt;
   VOX_TRY(const Document document, read_document(parts.json, own_bytes, path, ctx));
-  Buffers buffers(document, parts.own_bytes.value_or(std::span<const std::byte>{}), file, path, ctx);
+  Buffers buffers(document, parts.own_bytes.value_or(std::span<const std::byte>{}), file, path, folder, ctx);
   return SceneReader(document, buffers, path, ctx).read();
 }
 

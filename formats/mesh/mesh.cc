@@ -4,7 +4,6 @@
 
 #include <algorithm>
 #include <cmath>
-#include <filesystem>
 #include <map>
 #include <utility>
 
@@ -37,10 +36,10 @@ void bring_into_range(glm::vec4& color) {
   for (int c = 0; c < 4; ++c) color[c] = within_one(color[c]);
 }
 
-Result<MeshParts> read_parts(const std::string& path, Context& ctx) {
+Result<MeshParts> read_parts(const std::string& path, MeshFolder& folder, Context& ctx) {
   if (has_ending(path, ".ply")) return read_ply(path, ctx);
-  if (has_ending(path, ".obj")) return read_obj(path, ctx);
-  return read_gltf(path, ctx);
+  if (has_ending(path, ".obj")) return read_obj(path, folder, ctx);
+  return read_gltf(path, folder, ctx);
 }
 
 /// Drops the points that are nowhere, and says how many.
@@ -117,19 +116,19 @@ Status check_mesh(Mesh& mesh, const std::string& path) {
   return {};
 }
 
-Status load_pictures(MeshParts& parts, const std::string& path, Context& ctx) {
+Status load_pictures(MeshParts& parts, const std::string& path, MeshFolder& folder, Context& ctx) {
   Mesh& mesh = parts.mesh;
   std::vector<bool> used(mesh.materials.size());
   for (const MeshTriangle& triangle : mesh.triangles) used[triangle.material] = true;
   for (const MeshPoint& point : mesh.points) used[point.material] = true;
-  const std::string folder = std::filesystem::path(path).parent_path().string();
 
   const auto load = [&](const PictureReference& reference, const std::string& material) -> Result<Picture> {
     Result<Picture> picture;
     if (!reference.bytes.empty()) {
       picture = decode_picture(path, reference.bytes, ctx);
     } else {
-      const std::string file = find_picture(folder, reference.name);
+      VOX_TRY(const std::string file,
+              folder.find(reference.name, fmt::format("material {}: its texture", material)));
       if (file.empty())
         return bad_input(
             path, fmt::format("material {}: its texture {} is missing: expected it beside the mesh", material,
@@ -185,11 +184,13 @@ Status load_pictures(MeshParts& parts, const std::string& path, Context& ctx) {
   return {};
 }
 
-Result<Mesh> read_mesh(const std::string& path, Context& ctx) {
+Result<Mesh> read_mesh(const std::string& path, Context& ctx, const MeshOptions& options) {
   if (!is_mesh_name(path)) return bad_input(path, "not a mesh: expected .obj, .gltf, .glb or .ply");
-  VOX_TRY(MeshParts parts, read_parts(path, ctx));
+  MeshFolder folder(path, options.allow_outside);
+  VOX_TRY(MeshParts parts, read_parts(path, folder, ctx));
   VOX_CHECK(check_mesh(parts.mesh, path));
-  VOX_CHECK(load_pictures(parts, path, ctx));
+  VOX_CHECK(load_pictures(parts, path, folder, ctx));
+  if (std::string note = folder.note(); !note.empty()) parts.mesh.notes.push_back(std::move(note));
   return std::move(parts.mesh);
 }
 

@@ -75,6 +75,11 @@ struct Mesh {
 /// Whether a name ends like a mesh: .obj, .gltf, .glb or .ply.
 bool is_mesh_name(const std::string& name);
 
+/// What a user allows a mesh to do.
+struct MeshOptions {
+  bool allow_outside = false;  ///< to name files outside of its own folder
+};
+
 /// Reads a mesh: the triangles and points of all nodes of the scene in their places, polygons split, lines
 /// left out, triangles without area dropped. Colours of .obj and .ply files are taken as sRGB, those of glTF
 /// as linear light, as their specifications or usual writers have it. Materials of .obj whose picture or
@@ -83,7 +88,8 @@ bool is_mesh_name(const std::string& name);
 /// A .ply file without faces is no mesh but points (point_cloud.h): ErrorCode::input.
 ///
 /// A picture, a material library or a buffer that the mesh names and that is not there is an error, since the
-/// colours would be wrong in silence. Errors: ErrorCode::input, ErrorCode::limit.
-Result<Mesh> read_mesh(const std::string& path, Context& ctx);
+/// colours would be wrong in silence; so is one outside of its folder, unless options.allow_outside. Only
+/// regular files are read. Errors: ErrorCode::input, ErrorCode::limit.
+Result<Mesh> read_mesh(const std::string& path, Context& ctx, const MeshOptions& options = {});
 
 }  // namespace voxkit

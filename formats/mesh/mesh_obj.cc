@@ -14,6 +14,7 @@ namespace voxkit {
 namespace {
 
 constexpr uint32_t none = UINT32_MAX;
+constexpr const char* library_word = "material library";
 
 /// Numbers of a corner, from 0.
 struct Corner {
@@ -22,8 +23,8 @@ struct Corner {
 
 class ObjReader {
  public:
-  ObjReader(std::span<const std::byte> bytes, const std::string& path, Context& ctx)
-      : bytes_(bytes), path_(path), ctx_(ctx), builder_(path, ctx) {}
+  ObjReader(std::span<const std::byte> bytes, const std::string& path, MeshFolder& folder, Context& ctx)
+      : bytes_(bytes), path_(path), folder_(folder), ctx_(ctx), builder_(path, ctx) {}
 
   /// Vertices and materials first: what uses them may come before.
   Result<MeshParts> read() {
@@ -36,6 +37,8 @@ class ObjReader {
     for (const std::string& name : unknown_)
       builder_.note(fmt::format("material {} is in none of its libraries: white is taken", name));
     if (!dropped_.empty()) builder_.note(fmt::format("dropped: {}", fmt::join(dropped_, ", ")));
+    if (lacks_uvs_)
+      builder_.note("dropped: numbers of texture coordinates at corners: the file has no such coordinates");
     if (too_bright_) builder_.note("colors of vertices are above 1: they are taken as 1");
     return std::move(builder_).finish();
   }
@@ -99,9 +102,13 @@ class ObjReader {
 
   /// One name with spaces, or several names.
   Status read_libraries(std::string_view rest) {
-    const std::string folder = std::filesystem::path(path_).parent_path().string();
     std::vector<std::string> names{std::string(rest)};
-    if (find_picture(folder, names[0]).empty() && rest.find_first_of(" \t") != rest.npos) {
+    bool one = rest.find_first_of(" \t") == rest.npos;
+    if (!one) {
+      const auto found = folder_.find(names[0], library_word);
+      one = found && !found->empty();
+    }
+    if (!one) {
       names.clear();
       for (size_t at = 0; (at = rest.find_first_not_of(" \t", at)) != rest.npos;) {
         const size_t end = std::min(rest.find_first_of(" \t", at), rest.size());
@@ -111,10 +118,10 @@ class ObjReader {
     }
     for (const std::string& name : names) {
       if (!read_.insert(name).second) continue;
-      std::string file = find_picture(folder, name);
+      VOX_TRY(std::string file, folder_.find(name, library_word));
       if (file.empty()) {
         // Of a mesh that was renamed.
-        file = find_picture(folder, std::filesystem::path(path_).stem().string() + ".mtl");
+        VOX_TRY(file, folder_.find(std::filesystem::path(path_).stem().string() + ".mtl", library_word));
         if (file.empty()) return bad_input(path_, fmt::format("{} is missing, which the mesh needs", name));
         builder_.note(
             fmt::format("{} is missing: {} is taken", name, std::filesystem::path(file).filename().string()));
@@ -193,9 +200,10 @@ class ObjReader {
     return {};
   }
 
-  /// 1, 1/2, 1//3 or 1/2/3.
+  /// 1, 1/2, 1//3 or 1/2/3. Some programs write the second number where there are no texture coordinates at
+  /// all: it is dropped.
   Result<Corner> read_corner(const TextStatements& lines, std::string_view word, uint32_t vertices,
-                             uint32_t uvs) const {
+                             uint32_t uvs) {
     const std::string_view all = word;
     const auto index = [&](uint64_t before, uint64_t count, const char* what) -> Result<uint32_t> {
       const size_t end = std::min(word.find('/'), word.size());
@@ -207,14 +215,22 @@ class ObjReader {
       const auto [last, error] = std::from_chars(digits.data(), digits.data() + digits.size(), number);
       if (last != digits.data() + digits.size() || digits.empty() || number == 0 || error != std::errc())
         return bad(lines, fmt::format("{}: expected numbers of vertices, from 1 on", all));
-      if (number < 0) number += static_cast<int64_t>(before) + 1;
-      if (number < 1 || static_cast<uint64_t>(number) > count)
-        return bad(lines, fmt::format("{}: {} {}: out of range: expected 1 to {}", all, what, number, count));
-      return static_cast<uint32_t>(number - 1);
+      const int64_t from_one = number < 0 ? number + static_cast<int64_t>(before) + 1 : number;
+      if (from_one >= 1 && static_cast<uint64_t>(from_one) <= count)
+        return static_cast<uint32_t>(from_one - 1);
+      return bad(lines, fmt::format("{}: {} {}: out of range: {}", all, what, number,
+                                    count == 0   ? "the file has none"
+                                    : number > 0 ? fmt::format("expected 1 to {}", count)
+                                    : before > 0 ? fmt::format("expected -1 to -{}, those before it", before)
+                                                 : "there are none before it"));
     };
     Corner corner;
     VOX_TRY(corner.vertex, index(vertices, positions_.values.size(), "vertex"));
-    VOX_TRY(corner.uv, index(uvs, uvs_.values.size(), "texture coordinates"));
+    if (!uvs_.values.empty()) {
+      VOX_TRY(corner.uv, index(uvs, uvs_.values.size(), "texture coordinates"));
+    } else {
+      lacks_uvs_ |= !word.empty() && word.front() != '/';
+    }
     if (corner.vertex == none) return bad(lines, fmt::format("{}: expected the number of a vertex", all));
     return corner;
   }
@@ -274,6 +290,7 @@ class ObjReader {
 
   std::span<const std::byte> bytes_;
   const std::string& path_;
+  MeshFolder& folder_;
   Context& ctx_;
   MeshBuilder builder_;
   CountedList<glm::dvec3> positions_;
@@ -282,6 +299,7 @@ class ObjReader {
   MaterialLibrary library_;
   std::set<std::string> read_, dropped_, unknown_;
   bool too_bright_ = false, faint_ = false;  ///< that some color is
+  bool lacks_uvs_ = false;  ///< corners have numbers of texture coordinates, the file has none
 
   std::string name_;
   const ObjMaterial* now_ = nullptr;
@@ -298,9 +316,9 @@ class ObjReader {
 
 }  // namespace
 
-Result<MeshParts> read_obj(const std::string& path, Context& ctx) {
+Result<MeshParts> read_obj(const std::string& path, MeshFolder& folder, Context& ctx) {
   VOX_TRY(const auto file, MappedFile::open(path));
-  return ObjReader(file->bytes(), path, ctx).read();
+  return ObjReader(file->bytes(), path, folder, ctx).read();
 }
 
 }  // namespace voxkit

@@ -12,8 +12,9 @@ namespace voxkit {
 /// Reads an .obj file (Wavefront, "Object Files", 1995): polygons of v with vt, and points; colours behind
 /// the coordinates of a vertex are sRGB. Groups, normals and smoothing do not matter; lines, curves and
 /// surfaces are dropped, with a note. Lines of text may go on behind a backslash; numbers of vertices may
-/// lead to later ones. Errors: ErrorCode::input with the line, ErrorCode::limit.
-Result<MeshParts> read_obj(const std::string& path, Context& ctx);
+/// lead to later ones. Libraries of materials are looked for in `folder`. Errors: ErrorCode::input with the
+/// line, ErrorCode::limit.
+Result<MeshParts> read_obj(const std::string& path, MeshFolder& folder, Context& ctx);
 
 /// Picture coordinates, which count from the bottom here, become scale * uv + offset (-s and -o).
 struct MapTransform {

@@ -7,6 +7,7 @@
 #include <vector>
 
 #include "formats/mesh/mesh.h"
+#include "formats/mesh/mesh_folder.h"
 
 namespace voxkit {
 
@@ -38,7 +39,8 @@ struct MeshParts {
 /// ErrorCode::input.
 Status check_mesh(Mesh& mesh, const std::string& path);
 
-/// Reads the pictures of the materials that triangles and points use; each once.
-Status load_pictures(MeshParts& parts, const std::string& path, Context& ctx);
+/// Reads the pictures of the materials that triangles and points use; each once. `path` is the mesh's, for
+/// errors.
+Status load_pictures(MeshParts& parts, const std::string& path, MeshFolder& folder, Context& ctx);
 
 }  // namespace voxkit

@@ -5,11 +5,9 @@
 
 #include <algorithm>
 #include <array>
-#include <cctype>
 #include <cmath>
 #include <cstdlib>
 #include <cstring>
-#include <filesystem>
 #include <vector>
 
 #include "formats/image/image.h"
@@ -21,8 +19,6 @@
 
 namespace voxkit {
 namespace {
-
-namespace fs = std::filesystem;
 
 uint8_t byte_of(float value) {
   return static_cast<uint8_t>(std::lrint(value > 0 ? std::min(value, 255.0f) : 0.0f));
@@ -68,54 +64,6 @@ class PictureFile {
   PictureFile() = default;
   std::string path_;
 };
-
-std::string lower(std::string text) {
-  for (char& c : text) c = static_cast<char>(std::tolower(static_cast<unsigned char>(c)));
-  return text;
-}
-
-/// Whether there is a file; follows links.
-bool is_file(const fs::path& path) {
-  std::error_code error;
-  return fs::is_regular_file(path, error);
-}
-
-/// The file that a path means where upper and lower case are the same; empty where there is none.
-fs::path find_in_any_case(const fs::path& path) {
-  std::error_code error;
-  fs::path found = path.is_absolute() ? path.root_path() : fs::path(".");
-  for (const fs::path& part : path.relative_path()) {
-    if (fs::exists(found / part, error)) {
-      found /= part;
-      continue;
-    }
-    const std::string wanted = lower(part.string());
-    std::vector<std::string> matches;
-    for (fs::directory_iterator it(found, error), end; !error && it != end; it.increment(error))
-      if (std::string name = it->path().filename().string(); lower(name) == wanted)
-        matches.push_back(std::move(name));
-    if (matches.empty()) return {};
-    found /= *std::min_element(matches.begin(), matches.end());  // folders list their files in any order
-  }
-  return is_file(found) ? found : fs::path{};
-}
-
-/// %20 and the like become the characters that they mean.
-std::string unescaped(const std::string& text) {
-  std::string plain;
-  for (size_t i = 0; i < text.size(); ++i) {
-    const auto digit = [&](size_t at) {
-      return at < text.size() && std::isxdigit(static_cast<unsigned char>(text[at]));
-    };
-    if (text[i] == '%' && digit(i + 1) && digit(i + 2)) {
-      plain += static_cast<char>(std::stoi(text.substr(i + 1, 2), nullptr, 16));
-      i += 2;
-    } else {
-      plain += text[i];
-    }
-  }
-  return plain;
-}
 
 bool starts_with(std::span<const std::byte> bytes, std::string_view magic) {
   return bytes.size() >= magic.size() && std::memcmp(bytes.data(), magic.data(), magic.size()) == 0;
@@ -262,20 +210,6 @@ void set_opacity(Picture& picture, const Picture& mask, char channel) {
                        : static_cast<uint8_t>((77 * in[0] + 150 * in[1] + 29 * in[2] + 128) >> 8);
       picture.has_alpha |= alpha != 255;
     }
-}
-
-std::string find_picture(const std::string& folder, const std::string& name) {
-  std::string slashes = name;
-  std::replace(slashes.begin(), slashes.end(), '\\', '/');
-  const fs::path base(folder);
-  for (const std::string& written : {slashes, unescaped(slashes)}) {
-    if (written.empty() || written.find('\0') != std::string::npos) continue;
-    for (const fs::path& path : {base / written, base / fs::path(written).filename()}) {
-      if (is_file(path)) return path.string();
-      if (const fs::path found = find_in_any_case(path); !found.empty()) return found.string();
-    }
-  }
-  return {};
 }
 
 }  // namespace voxkit

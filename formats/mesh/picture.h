@@ -46,9 +46,4 @@ void adjust_colors(Picture& picture, float base, float gain);
 /// over it: the nearest texel counts.
 void set_opacity(Picture& picture, const Picture& mask, char channel = 0);
 
-/// Finds the file that a mesh in `folder` calls `name`: as it is written, with '/' for '\', and with its
-/// %-escapes resolved; then in letters of either case; then by its last part, beside the mesh. Empty where
-/// there is none.
-std::string find_picture(const std::string& folder, const std::string& name);
-
 }  // namespace voxkit

@@ -21,6 +21,28 @@ constexpr uint32_t position_tag = tag(0x0020, 0x0032), orientation_tag = tag(0x0
                    temporal_index_tag = tag(0x0020, 0x9128);
 constexpr double most_frames = 1 << 24;
 
+/// Takes the distances of pixels where they are some: two numbers above 0.
+void take_spacing(const DicomData& data, uint32_t what, DicomFrame& frame) {
+  if (data.text(what).empty()) return;
+  auto found = data.decimals(what, 2);
+  frame.odd_spacing = found.empty() || !(found[0] > 0 && found[1] > 0);
+  if (!frame.odd_spacing) frame.pixel_spacing = std::move(found);
+}
+
+/// Takes the distance of slices, whose sign says a direction, before their thickness.
+void take_thickness(const DicomData& data, DicomFrame& frame) {
+  if (!data.text(thickness_tag).empty()) {
+    const double thickness = data.decimal(thickness_tag, 0);
+    frame.odd_thickness = !(thickness > 0);
+    if (thickness > 0) frame.thickness = thickness;
+  }
+  if (!data.text(distance_tag).empty()) {
+    const double distance = std::abs(data.decimal(distance_tag, 0));
+    frame.odd_thickness = distance == 0;
+    if (distance > 0) frame.thickness = distance;
+  }
+}
+
 /// Takes what attributes, or items of sequences in them, say of a frame, in place of what was said before.
 void take(const DicomData& data, DicomFrame& frame) {
   const auto numbers = [](const DicomData& from, uint32_t what, size_t count, std::vector<double>& to) {
@@ -34,8 +56,8 @@ void take(const DicomData& data, DicomFrame& frame) {
   for (const DicomData* from : {&data, &data.item(tag(0x0054, 0x0022)), &place, &plane, &measures}) {
     numbers(*from, position_tag, 3, frame.position);
     numbers(*from, orientation_tag, 6, frame.orientation);
-    numbers(*from, spacing_tag, 2, frame.pixel_spacing);
-    frame.thickness = std::abs(from->decimal(distance_tag, from->decimal(thickness_tag, frame.thickness)));
+    take_spacing(*from, spacing_tag, frame);
+    take_thickness(*from, frame);
   }
   for (const DicomData* from : {&data, &scale}) {
     frame.slope = from->decimal(slope_tag, frame.slope);
@@ -203,7 +225,7 @@ Result<std::optional<DicomHeader>> read_dicom_header(const std::string& path) {
   const double scaling = data.decimal(tag(0x3004, 0x000e), 0);  // of doses
   take(data, shared);
   if (scaling != 0) shared.slope = scaling;
-  if (shared.pixel_spacing.empty()) shared.pixel_spacing = data.decimals(tag(0x0018, 0x1164), 2);
+  if (shared.pixel_spacing.empty() && !shared.odd_spacing) take_spacing(data, tag(0x0018, 0x1164), shared);
   take(data.item(tag(0x5200, 0x9229)), shared);
   h.frames.assign(static_cast<size_t>(frames), shared);
   const auto& each = data.items(tag(0x5200, 0x9230));

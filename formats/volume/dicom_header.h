@@ -18,8 +18,10 @@ namespace voxkit {
 struct DicomFrame {
   std::vector<double> position;       ///< 3, in mm
   std::vector<double> orientation;    ///< 6: directions of a row and of a column
-  std::vector<double> pixel_spacing;  ///< 2: distance of rows, distance of columns, in mm
+  std::vector<double> pixel_spacing;  ///< 2, above 0: distance of rows, distance of columns, in mm
   double thickness = 0;               ///< distance of slices, else their thickness, in mm; 0: not said
+  bool odd_spacing = false;           ///< the file's distances of pixels are no two numbers above 0
+  bool odd_thickness = false;         ///< its distance of slices, else their thickness, is no number above 0
   double slope = 1, intercept = 0;
   double time = 0;  ///< number of its time step
   /// Where its pixels begin in DicomHeader::pixels: bytes of the one part there (bits of pixels of one bit),

@@ -207,16 +207,30 @@ class Planner {
     return chosen[0];
   }
 
+  /// Says which lengths are assumed because the file has none, or none that can be. Where directions are not
+  /// said either, 1 is no claim. Of several slices places say the distance, or another note does.
+  void tell_assumed(const DicomFrame& first, double distance) {
+    if (first.odd_spacing)
+      ctx_.note(fmt::format("{}: its distances of pixels are not two numbers above 0: {}", name_,
+                            first.pixel_spacing.empty() ? "1 is assumed" : "those of all frames are taken"));
+    else if (first.pixel_spacing.empty() && !first.orientation.empty())
+      ctx_.note(fmt::format("{}: does not say how far apart its pixels are: 1 mm is assumed", name_));
+    if (first.odd_thickness && plan_.slices.size() == 1)
+      ctx_.note(
+          fmt::format("{}: its distance of slices is no number above 0: {} mm is assumed", name_, distance));
+  }
+
   void place_axes(bool placed) {
     const auto& slices = plan_.slices;
     const DicomFrame &first = plan_.frame(slices.front()), &last = plan_.frame(slices.back());
     double row = 1, column = 1;
-    if (first.pixel_spacing.size() == 2 && first.pixel_spacing[0] > 0 && first.pixel_spacing[1] > 0) {
+    if (!first.pixel_spacing.empty()) {
       row = first.pixel_spacing[0];
       column = first.pixel_spacing[1];
       plan_.unit = Unit::millimetre;
     }
-    double distance = first.thickness > 0 ? first.thickness : 1;
+    const double distance = first.thickness > 0 ? first.thickness : 1;
+    tell_assumed(first, distance);
     if (slices.size() > 1 && !placed)
       ctx_.note(
           fmt::format("{}: its slices do not say where they lie: in the order of their {}, taken to be {} "

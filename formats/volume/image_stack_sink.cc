@@ -119,13 +119,10 @@ class ImageStackSink final : public VolumeSink {
     if (!type || info.dims.x > INT32_MAX || info.dims.y > INT32_MAX)
       return fail(
           ErrorCode::usage, text,
-          fmt::format("images with this ending cannot hold {}{}: expected .tif (all formats), .png (8 and 16 "
-                      "bits, colours) or .exr (FLOAT32)",
-                      is_wide(info.sample_type) && !is_color(info.format)
-                          ? std::string(voxkit::name(info.sample_type)) + " as "
-                      : info.bias() ? "signed "
-                                    : "",
-                      voxkit::name(info.format)));
+          fmt::format("images with this ending cannot hold {}{}: expected .tif (what 32 bits hold), .png (8 "
+                      "and 16 bits, colours) or .exr (FLOAT32)",
+                      storage_bias(info.sample_type) && !is_color(info.format) ? "signed " : "",
+                      type_name(info)));
     sink->format_ = format;
     sink->type_ = library_type(*type);
     sink->stored_ = *type;

@@ -79,12 +79,15 @@ std::array<Affine::Vector, 3> cell_steps(const Header& header, const std::string
                                          Context& ctx) {
   std::array<double, 3> steps{1, 1, 1}, cosines{};
   bool said = false, right = true;
+  std::vector<std::string> odd;
   for (size_t i = 0; i < 3; ++i) {
     const float cell = header.get<float>(at_cell + 4 * i);
     const int32_t samples = header.get<int32_t>(at_samples + 4 * i);
     if (cell > 0 && std::isfinite(cell) && samples > 0) {
       steps[i] = double{cell} / samples;
       said = true;
+    } else if (cell != 0) {
+      odd.push_back(fmt::format("{} in {}", cell, samples));
     }
     const double angle = header.get<float>(at_angles + 4 * i);
     if (angle == 90 || angle == 0) continue;
@@ -93,6 +96,9 @@ std::array<Affine::Vector, 3> cell_steps(const Header& header, const std::string
     if (!(angle > 0 && angle < 180)) cosines[i] = 2;  // no angle of a cell
   }
   if (said) info.unit = Unit::angstrom;
+  if (!odd.empty())
+    ctx.note(fmt::format("{}: the cell has sides of {} parts, which are no lengths: steps of 1 are assumed",
+                         name, listed(odd)));
   std::array<Affine::Vector, 3> axes{{{steps[0], 0, 0}, {0, steps[1], 0}, {0, 0, steps[2]}}};
   if (right) return axes;
   const auto [alpha, beta, gamma] = cosines;
@@ -114,7 +120,7 @@ Status read_placement(const Header& header, const std::string& name, const std::
   VolumeInfo& info = map.info;
   const auto steps = cell_steps(header, name, info, ctx);
   std::array<double, 3> origin{};
-  bool placed = false, started = false;
+  bool placed = false, started = false, finite = true;
   // IMOD's own files have where the first voxel's place is the origin, with the other sign.
   const bool inverted = header.is_imod() && header.get<int32_t>(at_version) < version_2014 &&
                         (header.get<int32_t>(at_imod_flags) & imod_standard_origin) == 0;
@@ -125,10 +131,12 @@ Status read_placement(const Header& header, const std::string& name, const std::
     start[k] = header.get<int32_t>(at_start + 4 * k);
     started |= start[k] != 0;
     const double value = header.get<float>(at_origin + 4 * k);
+    finite &= std::isfinite(value);
     if (!std::isfinite(value)) continue;
     origin[k] = inverted ? 0 - value : value;
     placed |= value != 0;
   }
+  if (!finite) ctx.note(name + ": the origin has numbers that are not finite: they are dropped");
   info.affine.origin = info.affine.place(start);
   if (!placed) return {};
   const Affine::Vector started_at = info.affine.origin;
@@ -212,8 +220,11 @@ Result<Map> read_map(Header& header, const std::string& name, Context& ctx) {
         name, size_t{at_map}));
   }
   if (!checked_voxels(info.dims))
-    return bad_input(name, fmt::format("MRC header: {} x {} x {} voxels at byte 0: expected sides from 1",
-                                       info.dims.x, info.dims.y, info.dims.z));
+    return bad_input(
+        name,
+        fmt::format(
+            "MRC header: {} x {} x {} voxels at byte 0: expected {}", info.dims.x, info.dims.y, info.dims.z,
+            std::min({info.dims.x, info.dims.y, info.dims.z}) < 1 ? "sides from 1" : "at most 2^62 in all"));
   if (!axes) return tl::unexpected<Error>(axes.error());
   VOX_CHECK(read_type(header, name, map, ctx));
   if (extended < 0)

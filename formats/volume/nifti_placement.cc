@@ -108,6 +108,13 @@ double length(const Affine::Vector& v) {
   return std::hypot(v[0], v[1], v[2]);
 }
 
+bool is_finite(const Affine& affine) {
+  const auto finite = [](const Affine::Vector& v) {
+    return std::all_of(v.begin(), v.end(), [](double x) { return std::isfinite(x); });
+  };
+  return finite(affine.origin) && std::all_of(affine.axes.begin(), affine.axes.end(), finite);
+}
+
 /// Whether places differ by more than the rounding of a quaternion's floats explains.
 bool differ(const Affine& affine, const Affine& other, const Quaternion& q, Index3 dims) {
   double square = 0, diagonal = 0, far = length(affine.origin), worst = 0;
@@ -183,20 +190,12 @@ void read_placement(const Header& header, VolumeInfo& info, Context& ctx) {
   info.unit = unit < 4 ? units[unit] : Unit::unknown;
   if (unit >= 4) ctx.note(fmt::format("{}: the unit of code {} is not known: dropped", header.name, unit));
   const Quaternion q = quaternion_of(header);
-  std::vector<std::string> assumed;
-  for (size_t k = 0; k < 3; ++k) {
-    const double step = header.pixdim[k + 1];
-    const bool said = step != 0 && std::isfinite(step);
-    if (!said && info.dims[static_cast<int>(k)] > 1) assumed.push_back(fmt::format("{}", k + 1));
-  }
-  if (!assumed.empty() && header.sform_code <= 0)
-    ctx.note(fmt::format("{}: the distance of voxels along ax{} {} is not said: 1 is assumed", header.name,
-                         assumed.size() == 1 ? "is" : "es", listed(assumed)));
   Affine sform;
   for (size_t i = 0; i < 3; ++i) {
     for (size_t k = 0; k < 3; ++k) sform.axes[k][i] = header.rows[i][k];
     sform.origin[i] = header.rows[i][3];
   }
+  const bool finite = is_finite(sform);
   for (size_t k = 0; k < 3; ++k)  // of one slice the matrix may leave out the third axis
     if (info.dims[static_cast<int>(k)] > 1 && sform.axes[k] == Affine::Vector{}) sform.axes[k][0] = NAN;
   complete_axes(sform, q.steps);
@@ -207,8 +206,9 @@ void read_placement(const Header& header, VolumeInfo& info, Context& ctx) {
     info.world = World::ras;
     info.space_code = code <= 255 ? static_cast<uint8_t>(code) : uint8_t{0};
   };
-  const auto bad = [&](const char* form) {
-    ctx.note(fmt::format("{}: the {} has axes that are zero or in one plane: dropped", header.name, form));
+  const auto bad = [&](const char* form, bool is_finite) {
+    ctx.note(fmt::format("{}: the {} has {}: dropped", header.name, form,
+                         is_finite ? "axes that are zero or in one plane" : "numbers that are not finite"));
   };
   if (has_sform && sform.is_valid()) {
     take(sform, header.sform_code);
@@ -220,9 +220,18 @@ void read_placement(const Header& header, VolumeInfo& info, Context& ctx) {
     }
     return;
   }
-  if (has_sform) bad("sform");
+  if (has_sform) bad("sform", finite);
+  std::vector<std::string> assumed;
+  for (size_t k = 0; k < 3; ++k) {
+    const double step = header.pixdim[k + 1];
+    const bool said = step != 0 && std::isfinite(step);
+    if (!said && info.dims[static_cast<int>(k)] > 1) assumed.push_back(fmt::format("{}", k + 1));
+  }
+  if (!assumed.empty())
+    ctx.note(fmt::format("{}: the distance of voxels along ax{} {} is not said: 1 is assumed", header.name,
+                         assumed.size() == 1 ? "is" : "es", listed(assumed)));
   if (has_qform && qform.is_valid()) return take(qform, header.qform_code);
-  if (has_qform) bad("qform");
+  if (has_qform) bad("qform", is_finite(qform));
   info.affine = Affine::plain(q.steps, {0, 0, 0});
   if (header.kind != Kind::analyze) return;
   info.unit = parse_unit(header.analyze_unit).value_or(Unit::unknown);

@@ -56,14 +56,9 @@ Result<std::string> data_path(const Header& header, const fs::path& folder, cons
     return bad_input(header.name, fmt::format("data file \"{}\": {}", name.substr(0, 200), what));
   };
   if (name.empty()) return wrong("expected the name of a file");
-  const fs::path value(name);
-  const fs::path inside =
-      value.is_absolute()
-          ? value.lexically_normal().lexically_relative(fs::absolute(folder).lexically_normal())
-          : value.lexically_normal();
-  if (!options.allow_outside && (inside.empty() || *inside.begin() == ".."))
+  if (!options.allow_outside && leaves_folder(folder.string(), name))
     return wrong("lies outside of the header's folder: expected --allow-outside");
-  std::string path = (folder / value).string();
+  std::string path = (folder / name).string();
   std::error_code error;
   const fs::file_status status = fs::status(path, error);
   if (!fs::exists(status)) return bad_input(path, error ? error.message() : "No such file or directory");

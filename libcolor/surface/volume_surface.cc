@@ -110,7 +110,7 @@ class VolumeSurface final : public SurfaceSource {
 Result<std::unique_ptr<SurfaceSource>> surface_of(std::unique_ptr<VolumeSource> volume) {
   const VolumeInfo& info = volume->info();
   if (!is_color(info.format))
-    return bad_input({}, fmt::format("{} voxels: expected colors (RGBA32 or RGB24)", name(info.format)));
+    return bad_input({}, fmt::format("{} voxels: expected colors (RGBA32 or RGB24)", type_name(info)));
   if (std::max({info.dims.x, info.dims.y, info.dims.z}) > int64_t{1} << most_levels)
     return bad_input({}, fmt::format("{} x {} x {} voxels: expected at most {} a side", info.dims.x,
                                      info.dims.y, info.dims.z, 1 << most_levels));

@@ -147,6 +147,47 @@ TEST_F(DicomVolume, TiltIsAShear) {
   EXPECT_EQ(info_.affine.axes[2], (Affine::Vector{0, 0, 3}));
 }
 
+TEST_F(DicomVolume, LengthsThatCannotBeAreNamed) {
+  const auto noted = [&](const std::string& part) { return notes_.find(part) != std::string::npos; };
+  const auto put_slices = [&](const std::string& spacing, int count) {
+    for (int i = 0; i < count; ++i)
+      put(fmt::format("i{}.dcm", i),
+          File{}.at(fmt::format("0\\0\\{}", 2 * i)).set(0x28, 0x30, "DS", spacing).bytes());
+  };
+  for (const char* spacing : {"0\\0.5", "0.7\\-0.5", "nan\\0.5", "0.7", "0.7\\0.5\\1", "x\\y"}) {
+    SCOPED_TRACE(spacing);
+    put_slices(spacing, 2);
+    ASSERT_TRUE(open());
+    EXPECT_EQ(info_.affine, Affine::plain({1, 1, 2}, {0, 0, 0}));
+    EXPECT_TRUE(noted("its distances of pixels are not two numbers above 0: 1 is assumed")) << notes_;
+  }
+  // Not said at all.
+  put_slices("", 2);
+  ASSERT_TRUE(open());
+  EXPECT_TRUE(noted("does not say how far apart its pixels are: 1 mm is assumed")) << notes_;
+  // In one slice only: which of them counts is not known.
+  put("i1.dcm", File{}.at("0\\0\\2").bytes());
+  expect_refused("pixel spacing differs");
+  // Of one slice; of several it is their places that count, and where they have none, that is said already.
+  std::filesystem::remove(path("i1.dcm"));
+  for (const char* distance : {"0", "nan"}) {
+    put("i0.dcm", File{}.at("0\\0\\0").set(0x18, 0x88, "DS", distance).bytes());
+    ASSERT_TRUE(open());
+    EXPECT_EQ(info_.affine.axes[2][2], 1);
+    EXPECT_TRUE(noted("its distance of slices is no number above 0: 1 mm is assumed")) << notes_;
+  }
+  put("i0.dcm", File{}.at("0\\0\\0").set(0x18, 0x88, "DS", "0").set(0x18, 0x50, "DS", "3").bytes());
+  ASSERT_TRUE(open());
+  EXPECT_TRUE(noted("3 mm is assumed")) << notes_;
+  put("i0.dcm", File{}.at("0\\0\\0").set(0x18, 0x50, "DS", "-3").bytes());
+  ASSERT_TRUE(open());
+  EXPECT_TRUE(noted("its distance of slices is no number above 0: 1 mm is assumed")) << notes_;
+  put("i0.dcm", File{}.at("0\\0\\0").set(0x18, 0x88, "DS", "-3").bytes());
+  ASSERT_TRUE(open());
+  EXPECT_EQ(info_.affine.axes[2][2], 3);
+  EXPECT_EQ(notes_, "");
+}
+
 TEST_F(DicomVolume, MissingSlicesAreRefusedByTheirPositions) {
   const double positions[] = {0, 3, 9, 12};
   for (int i = 0; i < 4; ++i)

@@ -359,12 +359,62 @@ TEST_F(MeshFileTest, LargePicturesAreRefusedBeforeTheyAreDecoded) {
 TEST_F(MeshFileTest, OnlyRegularFilesAreOpened) {
   ASSERT_EQ(mkfifo(path("pipe").c_str(), 0600), 0);
   put("m.mtl", "newmtl a\nmap_Kd pipe\n");
-  expect_error("a.obj", obj_square("mtllib m.mtl\nusemtl a\n"), "pipe is missing");
-  expect_error("a.obj", obj_square("mtllib pipe\n"), "pipe is missing");
-  expect_error("a.gltf", GltfSquare{}.json("pipe"), "pipe is missing");
+  expect_error("a.obj", obj_square("mtllib m.mtl\nusemtl a\n"),
+               "material a: its texture \"pipe\": is not a regular file");
+  expect_error("a.obj", obj_square("mtllib pipe\n"), "material library \"pipe\": is not a regular file");
+  expect_error("a.gltf", GltfSquare{}.json("pipe"), "buffer \"pipe\": is not a regular file");
   put("m.mtl", "newmtl a\nmap_Kd /dev/zero\n");
-  expect_error("a.obj", obj_square("mtllib m.mtl\nusemtl a\n"), "/dev/zero is missing");
+  expect_error("a.obj", obj_square("mtllib m.mtl\nusemtl a\n"),
+               "\"/dev/zero\": lies outside of the mesh's folder: expected --allow-outside");
+  const auto zero = read_mesh(path("a.obj"), ctx_, {.allow_outside = true});
+  ASSERT_FALSE(zero);
+  EXPECT_NE(zero.error().what.find("\"/dev/zero\": is not a regular file"), std::string::npos)
+      << zero.error().what;
   expect_error("a.gltf", GltfSquare{}.json("https://example.org/a.bin"), "a.bin is missing");
+}
+
+TEST_F(MeshFileTest, FilesOutsideOfTheFolderNeedLeave) {
+  std::filesystem::create_directories(path("sub/x"));
+  picture("wall.png");
+  put("m.mtl", "newmtl a\nKd 1 0 0\n");
+  const GltfSquare square;
+  put("b.bin", square.buffer());
+  GltfSquare textured;
+  textured.material = R"({"pbrMetallicRoughness":{"baseColorTexture":{"index":0}}})";
+  const auto image = [&](const std::string& uri) {
+    textured.rest = R"(,"textures":[{"source":0}],"images":[{"uri":")" + uri + "\"}]";
+    return textured.gltf();
+  };
+  put("sub/up.mtl", "newmtl a\nmap_Kd ../wall.png\n");
+  const std::pair<const char*, std::string> meshes[] = {
+      {"sub/a.obj", obj_square("mtllib ../m.mtl\nusemtl a\n")},
+      {"sub/a.obj", obj_square("mtllib ..\\m.mtl\nusemtl a\n")},
+      {"sub/a.obj", obj_square("mtllib up.mtl\nusemtl a\n")},
+      {"sub/a.gltf", square.json("../b.bin")},
+      {"sub/a.gltf", square.json("x/../../b.bin")},
+      {"sub/a.gltf", square.json(path("b.bin"))},
+      {"sub/a.gltf", square.json("%2e%2e/b.bin")},
+      {"sub/a.gltf", image("../wall.png")}};
+  const MeshOptions leave{.allow_outside = true};
+  for (const auto& [name, content] : meshes) {
+    SCOPED_TRACE(content);
+    expect_error(name, content, "lies outside of the mesh's folder: expected --allow-outside");
+    const auto mesh = read_mesh(path(name), ctx_, leave);
+    ASSERT_TRUE(mesh) << mesh.error().what;
+    EXPECT_EQ(mesh->triangles.size(), 2u);
+    EXPECT_TRUE(mesh->notes.empty()) << mesh->notes[0];
+  }
+  // Beside the mesh there is one of that name: taken, and said. Where there is leave, the other one counts.
+  picture("sub/wall.png", {255, 0, 100, 255});
+  const std::string& there = meshes[2].second;
+  const Mesh beside = read("sub/a.obj", there);
+  EXPECT_TRUE(has_note(beside, "not where the mesh names it, and taken from beside the mesh: ../wall.png"));
+  EXPECT_TRUE(beside.pictures[0].has_alpha);
+  EXPECT_FALSE(read_mesh(path("sub/a.obj"), ctx_, leave)->pictures[0].has_alpha);
+  // What stays in the folder needs no leave, however it is written.
+  put("sub/m.mtl", "newmtl a\nmap_Kd x/../wall.png\n");
+  EXPECT_TRUE(read("sub/a.obj", obj_square("mtllib " + path("sub/m.mtl") + "\nusemtl a\n")).notes.size() ==
+              1);
 }
 
 TEST_F(MeshFileTest, NumbersThatAreNone) {

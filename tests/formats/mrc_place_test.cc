@@ -1,4 +1,6 @@
 // Where an MRC map is, which of several, and what of it is dropped.
+#include <fmt/format.h>
+
 #include <cmath>
 
 #include "tests/formats/mrc_files.h"
@@ -122,6 +124,24 @@ TEST_F(MrcPlaceTest, WhatContradictsIsNamed) {
   h.set(12, int32_t{6}), h.set(76, -3.0f);
   voxels_of(put("v.mrc", h.bytes + "abcd"));
   EXPECT_TRUE(noted("from -3 to 127, which those of mode 6")) << all_notes();
+}
+
+TEST_F(MrcPlaceTest, LengthsThatCannotBeAreNamed) {
+  for (const float cell : {-5.0f, NAN, INFINITY}) {
+    MrcHeader h(0, {2, 1, 1});
+    h.set(40, cell);
+    voxels_of(put("v.mrc", h.bytes + "ab"));
+    EXPECT_EQ(info_.affine.axes[0][0], 1);
+    EXPECT_TRUE(noted(fmt::format(
+        "the cell has sides of {} in 10 parts, which are no lengths: steps of 1 are assumed", cell)))
+        << all_notes();
+  }
+  MrcHeader h(0, {2, 1, 1});
+  h.set(196, 3.0f);
+  h.set(200, NAN);
+  voxels_of(put("v.mrc", h.bytes + "ab"));
+  EXPECT_EQ(info_.affine.origin, (Affine::Vector{3, 0, 0}));
+  EXPECT_TRUE(noted("the origin has numbers that are not finite: they are dropped")) << all_notes();
 }
 
 TEST_F(MrcPlaceTest, OldFilesWithoutMapAreRead) {

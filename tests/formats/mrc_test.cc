@@ -162,7 +162,12 @@ TEST_F(MrcTest, HeaderErrorsSayWhatIsExpected) {
          "not an MRC file: expected MAP at byte 208");
   refuse([](Header& h) { h.bytes[208] = 'X', h.set(12, int32_t{77}); }, "not an MRC file");
   refuse([](Header& h) { h.bytes[208] = 'X', h.set(68, int32_t{3}); }, "not an MRC file");
-  refuse([](Header& h) { h.set(0, INT32_MAX), h.set(4, INT32_MAX), h.set(8, INT32_MAX); }, "voxels");
+  refuse([](Header& h) { h.set(0, INT32_MAX), h.set(4, INT32_MAX), h.set(8, INT32_MAX); },
+         "2147483647 x 2147483647 x 2147483647 voxels at byte 0: expected at most 2^62 in all");
+  refuse([](Header& h) { h.set(0, INT32_MAX), h.set(4, INT32_MAX), h.set(8, 1); },
+         "too many voxels: expected at most 2^62 bytes");
+  refuse([](Header& h) { h.set(0, INT32_MAX); },
+         "voxel data at byte 1024 end after 48 bytes: expected 51539607528");
 }
 
 TEST_F(MrcTest, HostileFiles) {

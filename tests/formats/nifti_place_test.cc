@@ -84,6 +84,17 @@ TEST_F(NiftiPlaceTest, TheMatrixIsTakenBeforeTheQuaternionAndThatBeforeDistances
       info = info_of(put("v.nii", h.bytes + data));
       EXPECT_EQ(info.space_code, 2);
       EXPECT_TRUE(noted("the sform has axes that are zero or in one plane")) << all_notes();
+
+      // Forms with numbers that are none are dropped for that reason; and then distances that are none count.
+      h.sform(1, Affine{{{{1, 0, 0}, {0, 1, 0}, {0, 0, 1}}}, {NAN, 0, 0}});
+      EXPECT_EQ(info_of(put("v.nii", h.bytes + data)).space_code, 2);
+      EXPECT_TRUE(noted("the sform has numbers that are not finite: dropped")) << all_notes();
+      EXPECT_FALSE(noted("in one plane"));
+      h.qform(2, {1, NAN, 1, 2.5}, {0, 0, 0}, {0, INFINITY, 0});
+      info = info_of(put("v.nii", h.bytes + data));
+      EXPECT_EQ(info.affine, Affine::plain({1, 1, 2.5}, {0, 0, 0}));
+      EXPECT_TRUE(noted("the qform has numbers that are not finite: dropped")) << all_notes();
+      EXPECT_TRUE(noted("the distance of voxels along axis 1 is not said: 1 is assumed")) << all_notes();
     }
 }
 

@@ -42,10 +42,28 @@ TEST_F(ObjTest, CornersByNumber) {
   EXPECT_EQ(area(read("f 1 2 3 4\n" + v)), 1);
   // A comment ends with its line.
   EXPECT_EQ(area(read(v + "# C:\\\nf 1 2 3 4\n")), 1);
-  for (const char* face : {"f 1 2 0\n", "f 1 2 5\n", "f 1 2 -5\n", "f 1 2 x\n", "f 1 2 /1\n", "f 1/1 2 3\n",
-                           "f 1 2 99999999999999999999\n"})
+  for (const char* face :
+       {"f 1 2 0\n", "f 1 2 5\n", "f 1 2 -5\n", "f 1 2 x\n", "f 1 2 /1\n", "f 1 2 99999999999999999999\n"})
     expect_error("a.obj", v + face, "line 5: ");
-  expect_error("a.obj", v + "f 1 2 9\n", "out of range");
+  expect_error("a.obj", v + "f 1 2 9\n", "line 5: 9: vertex 9: out of range: expected 1 to 4");
+  expect_error("a.obj", v + "f 1 2 -5\n", "-5: vertex -5: out of range: expected -1 to -4, those before it");
+  expect_error("a.obj", "f -1 2 3\n" + v, "out of range: there are none before it");
+  expect_error("a.obj", "f 1 2 3\n", "1: vertex 1: out of range: the file has none");
+}
+
+TEST_F(ObjTest, CornersWithNumbersOfTextureCoordinatesThatAreNotThere) {
+  const std::string v = "v 0 0 0\nv 1 0 0\nv 1 1 0\nv 0 1 0\n";
+  // None at all: the numbers say nothing, and the surface is there. With a picture that is said once more.
+  for (const char* face : {"f 1/1/1 2/2/2 3/3/3 4/4/4\n", "f 1/1 2/2 3/3 4/4\n", "f 1/-1 2/-1 3/-1 4/-1\n"}) {
+    const Mesh mesh = read(v + face);
+    EXPECT_EQ(area(mesh), 1) << face;
+    EXPECT_TRUE(mesh.uvs.empty());
+    EXPECT_TRUE(has_note(mesh, "dropped: numbers of texture coordinates at corners")) << face;
+  }
+  EXPECT_TRUE(read(v + "f 1//1 2//1 3//1 4//1\n").notes.empty());
+  // Too few: the file is damaged, and its picture would lie elsewhere.
+  expect_error("a.obj", v + "vt 0 0\nvt 1 0\nf 1/1 2/2 3/3\n",
+               "line 7: 3/3: texture coordinates 3: out of range: expected 1 to 2");
 }
 
 TEST_F(ObjTest, PointsLinesAndWhatElseThereIs) {

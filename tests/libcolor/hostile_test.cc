@@ -122,6 +122,23 @@ TEST(ColorHostile, CountsThatDoNotAddUpAreFoundWithoutACheck) {
     EXPECT_EQ(walked.error().code, ErrorCode::input);
   }
   EXPECT_GE(changed, 2);
+  // The number of all colors that the parameters say: not that of the root, it is no volume to walk.
+  for (const uint64_t more : {uint64_t{1}, ~uint64_t{0}, uint64_t{1} << 36}) {
+    Bytes file = whole;
+    for (size_t i = 0; i < table.entries; ++i) {
+      const std::byte* const entry = &file[table.offset + 64 * i];
+      if (load_le<uint32_t>(entry) != chunk_kind("DAGP")) continue;
+      std::byte* const colors = &file[load_le<uint64_t>(entry + 16) + 8];
+      store_le(colors, load_le<uint64_t>(colors) + more);
+    }
+    voxkit::test::reseal(file);
+    const auto container = Container::open(file, "test", nullptr);
+    ASSERT_TRUE(container);
+    const auto volume = Volume::open(*container);
+    const auto first = volume ? (*volume)->voxel(Index3(0)) : tl::unexpected<Error>(volume.error());
+    ASSERT_FALSE(first) << more;
+    EXPECT_EQ(first.error().code, ErrorCode::input);
+  }
 }
 
 TEST(ColorHostile, DamagedBlocksAreFoundWithoutACheck) {

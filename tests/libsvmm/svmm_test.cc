@@ -3,8 +3,10 @@
 #include <gtest/gtest.h>
 
 #include <cmath>
+#include <map>
 
 #include "formats/volume/readers.h"
+#include "libsvmm/commonest.h"
 #include "tests/libsvmm/reference.h"
 #include "tests/libsvmm/volumes.h"
 
@@ -202,6 +204,151 @@ TEST(Svmm, ParametersThatDoNotGoTogetherAreRefused) {
   refused(with([](Params& p) { p.base = Base::alpha; }), VoxelFormat::rgb24, "alpha");
   refused(with([](Params& p) { p.base = Base::gray; }), VoxelFormat::density8, "gray");
   refused(with([](Params& p) { p.base = Base::bc1; }), VoxelFormat::rgba32, "bc1");
+}
+
+/// Of integers: whole blocks of the fill value, parts of blocks, and void outside of the volume.
+TEST(Svmm, FillValuesComeBackAndHaveNoPartInAverages) {
+  std::mt19937 random(9);
+  for (const VoxelFormat f : {VoxelFormat::density8, VoxelFormat::density16})
+    for (const double quality : {100.0, 90.0})
+      for (const bool all : {false, true}) {
+        SCOPED_TRACE(testing::Message() << name(f) << " quality " << quality << " all " << all);
+        VolumeInfo info = make_info({37, 33, 35}, f);
+        const uint32_t fill = 200;
+        info.fill = fill;
+        std::vector<Voxel> voxels;
+        for (int64_t i = 0; i < info.box().voxels(); ++i) {
+          const auto value = static_cast<uint32_t>(all || i % 37 < 23 ? fill : 100 + random() % 4);
+          voxels.push_back(f == VoxelFormat::density16 ? Voxel::of(static_cast<uint16_t>(value))
+                                                       : Voxel::of(static_cast<uint8_t>(value)));
+        }
+        const Params params = make_params(f, quality, {2}, 2);
+        voxkit::test::MemorySource source(info, bytes_of(voxels, f));
+        const auto volume = encode_to_memory(source, params).open();
+        const auto value_at = [&](const std::vector<std::byte>& bytes, size_t i) {
+          return f == VoxelFormat::density16 ? load_le<uint16_t>(&bytes[2 * i]) : load_le<uint8_t>(&bytes[i]);
+        };
+        const auto decoded = decode_all(*volume);
+        for (size_t i = 0; i < voxels.size(); ++i) {
+          const auto want = static_cast<int64_t>(voxels[i].as<uint32_t>());
+          const int64_t bound = want == fill ? 0 : static_cast<int64_t>(params.delta * params.full_scale);
+          ASSERT_LE(std::abs(value_at(decoded, i) - want), bound) << i;
+        }
+        for (int level = 1; level < static_cast<int>(volume->levels().size()); ++level) {
+          const auto coarser = decode_all(*volume, level);
+          for (size_t i = 0; i < coarser.size() / static_cast<size_t>(voxel_bytes(f)); ++i) {
+            const auto value = value_at(coarser, i);
+            ASSERT_TRUE(value == fill || (!all && value >= 100 && value <= 103))
+                << level << " " << i << " " << value;
+          }
+        }
+        Context ctx = context();
+        EXPECT_TRUE(volume->check(ctx));
+      }
+}
+
+/// The commonest of labels that are weighed, of several such the least.
+uint32_t commonest_of(const std::map<uint32_t, uint64_t>& weights) {
+  auto best = weights.begin();
+  for (auto at = weights.begin(); at != weights.end(); ++at)
+    if (at->second > best->second) best = at;
+  return best->first;
+}
+
+TEST(Svmm, LabelsAreKeptAndTheirLevelsHaveTheCommonest) {
+  std::mt19937 random(3);
+  for (const VoxelFormat f : {VoxelFormat::density8, VoxelFormat::density16, VoxelFormat::float32})
+    for (const std::vector<int>& widths : {std::vector<int>{2}, {4, 2}, {16}}) {
+      SCOPED_TRACE(testing::Message() << name(f) << " width " << widths[0]);
+      VolumeInfo info = make_info({37, 22, 19}, f);
+      info.is_labels = true;
+      if (f != VoxelFormat::float32) info.fill = 3;  // one label of many
+      std::vector<Voxel> voxels;
+      for (int64_t i = 0; i < info.box().voxels(); ++i) {
+        const auto label = static_cast<uint32_t>(i / 37 % 22 < 9 ? 3 : random() % 5 * 50);
+        voxels.push_back(f == VoxelFormat::float32     ? Voxel::of(static_cast<float>(label))
+                         : f == VoxelFormat::density16 ? Voxel::of(static_cast<uint16_t>(label * 200))
+                                                       : Voxel::of(static_cast<uint8_t>(label)));
+      }
+      Params params = make_params(f, 100, widths, 2);
+      voxkit::test::MemorySource source(info, bytes_of(voxels, f));
+      const Encoded encoded = encode_to_memory(source, params);
+      const auto volume = encoded.open();
+      EXPECT_TRUE(volume->info().is_labels);
+      ASSERT_EQ(decode_all(*volume), bytes_of(voxels, f));
+      Context ctx = context();
+      EXPECT_TRUE(volume->check(ctx));
+      EXPECT_EQ(encode_to_memory(source, params, 1).bytes, encoded.bytes);
+      // Level by level: of the labels below, each as heavy as the voxels that it stands for.
+      struct Cell {
+        uint32_t label;
+        uint64_t weight;
+      };
+      std::vector<Cell> below;
+      for (const Voxel& v : voxels) below.push_back({v.as<uint32_t>(), 1});
+      Index3 dims = info.dims;
+      for (size_t k = 0; k + 1 < encoded.levels.size(); ++k) {
+        const auto w = static_cast<int64_t>(encoded.levels[k].blockwidth);
+        const Index3 up = (dims + (w - 1)) / w;
+        std::vector<Cell> cells;
+        for (int64_t z = 0; z < up.z; ++z)
+          for (int64_t y = 0; y < up.y; ++y)
+            for (int64_t x = 0; x < up.x; ++x) {
+              std::map<uint32_t, uint64_t> weights;
+              uint64_t all = 0;
+              for (int64_t c = z * w; c < std::min(dims.z, (z + 1) * w); ++c)
+                for (int64_t b = y * w; b < std::min(dims.y, (y + 1) * w); ++b)
+                  for (int64_t a = x * w; a < std::min(dims.x, (x + 1) * w); ++a) {
+                    const Cell& cell = below[static_cast<size_t>((c * dims.y + b) * dims.x + a)];
+                    weights[cell.label] += cell.weight;
+                    all += cell.weight;
+                  }
+              cells.push_back({commonest_of(weights), all});
+            }
+        dims = up;
+        below = std::move(cells);
+        const int level = static_cast<int>(k) + 1;
+        ASSERT_EQ(volume->dims_at(level), dims);
+        const auto decoded = decode_all(*volume, level);
+        for (size_t i = 0; i < below.size(); ++i)
+          ASSERT_EQ(0, std::memcmp(&decoded[i * static_cast<size_t>(voxel_bytes(f))], &below[i].label,
+                                   static_cast<size_t>(voxel_bytes(f))))
+              << "level " << level << " voxel " << i;
+      }
+      EXPECT_GT(encoded.levels.size(), 2u);
+    }
+  // In runs, and so many different ones that counts are joined on the way.
+  Commonest counts;
+  counts.clear();
+  for (uint32_t i = 0; i < 100000; ++i) counts.add(i * 7919 % 50000, i % 50000 == 777 ? 1 : 2);
+  counts.add(40000, 1);
+  EXPECT_EQ(counts.key(), 40000u);
+}
+
+TEST(Svmm, LabelsAndTablesHaveNoValuesBetween) {
+  VolumeInfo info = make_info({64, 64, 64}, VoxelFormat::density8);
+  const auto refused = [&](const Params& params, const char* word) {
+    const auto status = validate(params, info);
+    ASSERT_FALSE(status);
+    EXPECT_EQ(status.error().code, ErrorCode::usage);
+    EXPECT_NE(status.error().what.find(word), std::string::npos) << status.error().what;
+  };
+  Params params = make_params(info.format, 100, {}, 32);
+  info.is_labels = true;
+  EXPECT_TRUE(validate(params, info));
+  params.delta = 0.01;
+  refused(params, "labels have no values between them: expected --quality 100");
+  info.is_labels = false;
+  EXPECT_TRUE(validate(params, info));
+  info.labels = std::make_shared<const std::vector<int64_t>>(std::vector<int64_t>{-70000, 0, 1});
+  refused(params, "values that are 65536 and more apart");
+  info.is_labels = true;
+  params.delta = 0;
+  params.base = Base::bitmap;
+  refused(params, "--base raw");
+  params.base = Base::raw;
+  params.layout = Layout::thesis;
+  refused(params, "--layout plain");
 }
 
 TEST(Svmm, MemoryLimitIsKept) {

@@ -122,7 +122,10 @@ void declare_input_options(CommandLine& line, OpenOptions& options, bool type) {
                                : word == "fill" ? OpenOptions::Gaps::fill
                                                 : OpenOptions::Gaps::refuse;
               }));
-  line.flag("--allow-outside", "A header may name data files outside of its own folder",
+  line.flag("--allow-outside",
+            "The input may name files outside of its own folder: data of a header, buffers, materials and "
+            "textures of "
+            "a mesh",
             options.allow_outside);
 }
 

@@ -24,7 +24,7 @@ Surface voxelise(const std::string& name, const SurfaceOptions& options, Context
     VOX_TRY(auto points, open_ply_points(name));
     if (points) return color::surface_of_points(std::move(points), voxelise.resolution, ctx);
   }
-  VOX_TRY(Mesh mesh, read_mesh(name, ctx));
+  VOX_TRY(Mesh mesh, read_mesh(name, ctx, {.allow_outside = options.open.allow_outside}));
   return color::make_surface(std::move(mesh), voxelise, ctx);
 }
 
