@@ -101,7 +101,7 @@ Status halve_colors(ConstVoxelSpan in, Index3 size, size_t channels, std::byte* 
 template <class T>
 Status halve_slab(ConstVoxelSpan in, Index3 size, const VolumeInfo& info, std::byte* out, Context& ctx) {
   const Index3 half = (size + int64_t{1}) / int64_t{2};
-  const Rule rule = info.is_labels || info.format == VoxelFormat::bitmap ? Rule::commonest : Rule::mean;
+  const Rule rule = has_no_means(info) ? Rule::commonest : Rule::mean;
   const int64_t fill =
       info.fill && info.format != VoxelFormat::float32 ? static_cast<int64_t>(*info.fill) : -1;
   return parallel_for(ctx, half.y * half.z, [&](int64_t i) -> Status {

@@ -185,7 +185,7 @@ class Encoder {
     }
     if (info_.format == VoxelFormat::float32) {
       VOX_CHECK(choose_map());
-    } else if (!info_.is_labels && !info_.fill) {
+    } else if (!has_no_means(info_) && !info_.fill) {
       const auto values = survey_.values();
       Raster raster(values);
       if (raster.step() > 2 * params_.max_error) raster_ = std::move(raster);
@@ -282,7 +282,7 @@ class Encoder {
       const auto values = survey_.values();
       options.max_sample = values.empty() ? 0 : values.back();
       // Means of voxels may be other values.
-      const bool same_values = level == 0 || info_.is_labels || info_.format == VoxelFormat::bitmap;
+      const bool same_values = level == 0 || has_no_means(info_);
       if (options.max_error == 0 && same_values) options.values = values;
       if (level > 0 && !raster_.empty()) options.values = raster_.values();
       // Values that are few beside the steps of the bound may take fewer bytes than these.

@@ -135,21 +135,26 @@ TEST(Packed, LevelsAreNoFinerThanTheVolume) {
   }
 }
 
-TEST(Packed, LevelsOfLabelsAreTheCommonest) {
-  VolumeInfo info = make_info({3, 2, 2}, VoxelFormat::density8);
-  info.dims = {18, 2, 2};
-  info.is_labels = true;
-  Bytes voxels(72, std::byte{9});
-  // Of the first cube three 5, three 7 and two 9: the least of the commonest.
-  const size_t cube[] = {0, 1, 18, 19, 36, 37, 54, 55};
-  const int labels[] = {7, 5, 9, 7, 5, 9, 7, 5};
-  for (size_t i = 0; i < 8; ++i) voxels[cube[i]] = static_cast<std::byte>(labels[i]);
-  voxkit::test::MemorySource source(info, voxels);
-  const auto volume = open(encode(source, {}).bytes);
-  ASSERT_EQ(volume->params().levels, 2);
-  const Bytes coarser = decode(*volume, 1);
-  EXPECT_EQ(coarser[0], std::byte{5});
-  EXPECT_EQ(coarser[1], std::byte{9});
+TEST(Packed, LevelsOfLabelsAndTablesAreTheCommonest) {
+  for (const bool table : {false, true}) {
+    VolumeInfo info = make_info({3, 2, 2}, VoxelFormat::density8);
+    info.dims = {18, 2, 2};
+    info.is_labels = !table;
+    if (table)
+      info.labels = std::make_shared<const std::vector<int64_t>>(
+          std::vector<int64_t>{-9, 0, 5, 1000, 70000, 80000, 90000, 100000, 200000, 300000});
+    Bytes voxels(72, std::byte{9});
+    // Of the first cube three 5, three 7 and two 9: the least of the commonest.
+    const size_t cube[] = {0, 1, 18, 19, 36, 37, 54, 55};
+    const int labels[] = {7, 5, 9, 7, 5, 9, 7, 5};
+    for (size_t i = 0; i < 8; ++i) voxels[cube[i]] = static_cast<std::byte>(labels[i]);
+    voxkit::test::MemorySource source(info, voxels);
+    const auto volume = open(encode(source, {}).bytes);
+    ASSERT_EQ(volume->params().levels, 2);
+    const Bytes coarser = decode(*volume, 1);
+    EXPECT_EQ(coarser[0], std::byte{5});
+    EXPECT_EQ(coarser[1], std::byte{9});
+  }
 }
 
 TEST(Packed, NoVoxelIsFurtherThanTheBound) {
