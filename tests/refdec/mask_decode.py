@@ -64,10 +64,10 @@ def places(shape, parents):
 def decode_mask(model, page, shape, parents=None):
     """Of each voxel of a page of `shape` voxels whether it is solid. `parents`, of a model that has them: the mask of
     their page, its shape, and where in it those of this page begin."""
+    if not page:
+        return [False] * (shape[0] * shape[1] * shape[2])
     where = places(shape, parents[1:] if model.parents else None)
     may = [not model.parents or parents[0][parent] for parent, *_ in where]
-    if not page:
-        return [False] * len(where)
     if len(page) == 1:
         require(page[0] == 1, "mask: byte {}, expected 1", page[0])
         return may

@@ -182,16 +182,21 @@ class PackedCase(ToolCase):
         return counts_of
 
     def same_or_refused(self, data):
-        """What both decoders make of a file is the same; returns whether it is anything."""
+        """What both decoders make of a file is the same; returns whether it is anything. Of what a reader may leave unread
+        the tool may not have seen that it is not valid."""
         write(self.path("bad.svmm"), data)
-        try:
-            packed = Packed(Container(data))
-            reference = raw_file(packed.volume.samples(decode(packed, 0)), packed.volume.sample)
-        except Refused as error:
-            reference, why = None, error
-        tool = subprocess.run([os.path.join(BIN, "vox-decode"), self.path("bad.svmm"), "-f", "-o", self.path("bad.raw")],
+        results = []
+        for strict in (True, False):
+            try:
+                packed = Packed(Container(data), strict)
+                results.append(raw_file(packed.volume.samples(decode(packed, 0)), packed.volume.sample))
+                break
+            except Refused as error:
+                results.append(None)
+                why = error
+        done = subprocess.run([os.path.join(BIN, "vox-decode"), self.path("bad.svmm"), "-f", "-o", self.path("bad.raw")],
                               stderr=subprocess.PIPE)
-        self.assertEqual(tool.returncode, 3 if reference is None else 0, tool.stderr if reference is not None else why)
-        if reference is not None:
-            self.assertEqual(read(self.path("bad.raw")), reference)
-        return reference is not None
+        self.assertIn(done.returncode, (0, 3), done.stderr)
+        tool = read(self.path("bad.raw")) if done.returncode == 0 else None
+        self.assertTrue(tool in results, done.stderr or (why if results == [None, None] else "other voxels"))
+        return tool is not None

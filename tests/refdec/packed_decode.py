@@ -9,6 +9,7 @@ of FORMAT.md. Exit codes: 0 done, 2 usage, 3 the file is unreadable, corrupt or 
 """
 
 import argparse
+import itertools
 import json
 import math
 import struct
@@ -22,6 +23,7 @@ SVMM = 1
 INTEGERS, ORDERED, STEPS, COLOURS = 1, 2, 3, 4
 CODES = {1: "integers", 2: "ordered", 3: "steps", 4: "colours"}
 CHANNELS = {"RGBA32": 4, "RGB24": 3}
+MASK = -1  # in place of a channel
 CODE_BYTES = {"DENSITY8": 1, "DENSITY16": 2, "FLOAT32": 4, "BITMAP": 1}
 GREATEST = {"DENSITY8": 255, "DENSITY16": 65535, "FLOAT32": 2**32 - 1, "BITMAP": 1}
 GREATEST_FLOAT = (2 - 2.0**-23) * 2.0**127
@@ -33,9 +35,11 @@ def divide_up(a, b):
 
 
 class Packed:
-    """Section 2.6: the parameters of a file, its models, and where its pages are."""
+    """Section 2.6: the parameters of a file, its models, and where its pages are. One that is not `strict` leaves unread
+    whatever a reader may."""
 
-    def __init__(self, container):
+    def __init__(self, container, strict=True):
+        self.strict = strict
         require(container.codec == SVMM, "header: byte 10: codec {}, expected 1 (SVMM)", container.codec)
         self.container, self.volume = container, Volume(container)
         chunk = container.only(b"PAKP")
@@ -68,7 +72,7 @@ class Packed:
             self.models.append(models)
             self.masks.append(masks)
         require(not models[0].parents, "chunks MODL: the model of level {} has parents", self.count - 1)
-        self.known = {}  # levels that were decoded
+        self.known, self.parts = {}, {}  # pages that were decoded, and parts that were read
 
     def dims(self, level):
         return tuple(divide_up(d, 1 << level) for d in self.volume.dims)
@@ -81,7 +85,7 @@ class Packed:
         return (1 << 19) // self.side**3
 
     def check_chunks(self):
-        unused = {key for key in self.container.chunks if key[0] in (b"MODL", b"MMOD", b"PAGE", b"MASK")}
+        unused = {key for key in self.container.chunks if key[0] in (b"MODL", b"PAGE") + (b"MMOD", b"MASK") * self.volume.colour}
 
         def use(kind, level, part):
             require((kind, level, part) in unused, "chunk table: part {} of chunk {} {} is missing", part, kind.decode(), level)
@@ -121,6 +125,8 @@ class Packed:
 
     def read_part(self, kind, level, part, entries):
         """The bytes of its pages, of each `entries` in turn."""
+        if (kind, level, part) in self.parts:
+            return self.parts[kind, level, part]
         data = self.content((kind, level, part))
         count = entries * min(self.part_pages(), math.prod(self.pages(level)) - part * self.part_pages())
         where = "chunk {} {}.{}: ".format(kind.decode(), level, part)
@@ -134,42 +140,54 @@ class Packed:
             pages.append(data[at:at + length])
             at += length
         require(at == len(data), where + "lengths of pages that do not add up")
+        self.parts[kind, level, part] = pages
         return pages
 
-    def decoded(self, level):
-        """Of each page of a level: its corner, its shape, the samples of each channel, and its mask or None."""
-        if level in self.known:
-            return self.known[level]
-        dims, grid, side, models, masks = self.dims(level), self.pages(level), self.side, self.models[level], self.masks[level]
-        if models[0].parents:
-            above, above_grid = self.decoded(level + 1), self.pages(level + 1)
-        out = []
-        for part in range(divide_up(math.prod(grid), self.part_pages())):
-            pages = self.read_part(b"PAGE", level, part, self.channels)
-            mask_pages = self.read_part(b"MASK", level, part, 1) if masks else [None] * len(pages)
-            for at in range(0, len(pages), self.channels):
-                x, y, z = len(out) % grid[0], len(out) // grid[0] % grid[1], len(out) // (grid[0] * grid[1])
-                corner = side * x, side * y, side * z
-                shape = tuple(min(side, d - c) for c, d in zip(corner, dims))
-                name, mask = "level {}, page at {}".format(level, corner), None
-                parents = [None] * (self.channels + 1)  # those of the mask are the last
-                if models[0].parents:
-                    _, around, samples, mask = above[(z // 2 * above_grid[1] + y // 2) * above_grid[0] + x // 2]
-                    begin = tuple(i % 2 * side // 2 for i in (x, y, z))
-                    parents = [(of_one, around, begin) for of_one in (*samples, mask)]
-                if masks:
-                    mask = self.named(name, decode_mask, masks, mask_pages[at // self.channels], shape, parents[-1])
-                samples = [self.named(name, decode_page, model, pages[at + c], shape, parents[c], mask)
-                           for c, model in enumerate(models)]
-                out.append((corner, shape, samples, mask))
-        self.known[level] = out
-        return out
+    def page(self, level, at, channel):
+        """The bytes of a channel of page `at`, or of its mask."""
+        grid = self.pages(level)
+        part, number = divmod((at[2] * grid[1] + at[1]) * grid[0] + at[0], self.part_pages())
+        if channel == MASK:
+            return self.read_part(b"MASK", level, part, 1)[number]
+        return self.read_part(b"PAGE", level, part, self.channels)[number * self.channels + channel]
 
-    def voxels(self, samples, mask):
+    def shape(self, level, at):
+        return tuple(min(self.side, d - self.side * i) for i, d in zip(at, self.dims(level)))
+
+    def decoded(self, level, at, channel):
+        """Of a page the samples of a channel; or its mask, which scalars have none of."""
+        if channel == MASK and not self.volume.colour:
+            return None
+        key = level, at, channel
+        if key in self.known:
+            return self.known[key]
+        page, shape, parents = self.page(level, at, channel), self.shape(level, at), None
+        if channel == MASK:
+            model, alone = self.masks[level], 0
+        else:
+            model, mask = self.models[level][channel], self.decoded(level, at, MASK)
+            alone = model.value_bytes
+            if not self.strict and mask and not self.page(level, at, MASK):
+                page = b""
+        if model.parents and (self.strict or len(page) > alone):
+            above = tuple(i // 2 for i in at)
+            begin = tuple(i % 2 * self.side // 2 for i in at)
+            parents = self.decoded(level + 1, above, channel), self.shape(level + 1, above), begin
+        name = "level {}, page at {}".format(level, tuple(self.side * i for i in at))
+        if channel == MASK:
+            self.known[key] = self.named(name, decode_mask, model, page, shape, parents)
+        else:
+            self.known[key] = self.named(name, decode_page, model, page, shape, parents, mask)
+        return self.known[key]
+
+    def voxels(self, level, at):
         """The bytes of each voxel of a page."""
-        known = {} if mask is None else {None: bytes(self.channels)}
-        codes = samples[0]
-        if mask is not None:
+        mask = self.decoded(level, at, MASK)
+        samples = [self.decoded(level, at, c) for c in range(self.channels)]
+        if mask is None:
+            known, codes = {}, samples[0]
+        else:
+            known = {None: bytes(self.channels)}
             codes = [code if solid else None for code, solid in zip(zip(*samples), mask)]
         for code in set(codes) - known.keys():
             known[code] = self.stored(code)
@@ -196,8 +214,9 @@ def decode(packed, level):
     """The voxels of a level."""
     dims, size = packed.dims(level), packed.volume.voxel_bytes
     out = bytearray(math.prod(dims) * size)
-    for corner, shape, samples, mask in packed.decoded(level):
-        voxels = packed.voxels(samples, mask)
+    for z, y, x in itertools.product(*map(range, packed.pages(level)[::-1])):
+        shape, voxels = packed.shape(level, (x, y, z)), packed.voxels(level, (x, y, z))
+        corner = [packed.side * i for i in (x, y, z)]
         for row in range(shape[1] * shape[2]):
             y, z = corner[1] + row % shape[1], corner[2] + row // shape[1]
             at = ((z * dims[1] + y) * dims[0] + corner[0]) * size
