@@ -6,6 +6,7 @@ Without VOXKIT_BIN only the tests that need no tool are run.
 
 import itertools
 import json
+import math
 import os
 import random
 import struct
@@ -261,3 +262,162 @@ class SmallFile(unittest.TestCase):
         self.pages[5] = b"\5\5\5\5"
         self.refused(self.chunks(), "page at .16, 0, 0.: page: it does not end")
         self.assertEqual(self.decode(self.chunks(), 0, False), good)
+
+
+# ---- With tools ------------------------------------------------------------------------------------------------------
+
+
+def limited(*channels):
+    return bytes(min(max(int(c), 0), 255) for c in channels)
+
+
+def surfaces(noise, dims, size):
+    """Smooth colours, void in half of the volume and here and there in the rest; opaque."""
+    for z, y, x in itertools.product(*map(range, dims[::-1])):
+        void = x + 2 * y + z > sum(dims) // 2 or noise.random() < 0.2
+        c = limited(40 + 9 * x + noise.randrange(3), 50 + 9 * x + 5 * y, 90 + 6 * z + 9 * x + noise.randrange(3), 255)[:size]
+        yield bytes(size) if void else c
+
+
+def solid(noise, dims, size):
+    """No voids; colours with little in common."""
+    for z, y, x in itertools.product(*map(range, dims[::-1])):
+        yield limited(200 - 9 * x + noise.randrange(5), 20 + 7 * y + noise.randrange(5), 99 + 9 * z, 7 + noise.randrange(249))[:size]
+
+
+def void(noise, dims, size):
+    return [bytes(size)] * (dims[0] * dims[1] * dims[2])
+
+
+def clear(noise, dims, size):
+    """Alpha of any kind, much of it 0, of colours that are something nevertheless."""
+    for z, y, x in itertools.product(*map(range, dims[::-1])):
+        alpha = noise.choice((0, 0, 255, 1, 40 + 5 * x))
+        yield (limited(5 * x, 9 * y + 1, 3 * z) + bytes((min(alpha, 255),)))[:size] if noise.random() < 0.7 else bytes(size)
+
+
+def few(noise, dims, size):
+    colours = [bytes(size)] * 2 + [noise.randbytes(size) for _ in range(4)]
+    for z, y, x in itertools.product(*map(range, dims[::-1])):
+        yield colours[(x // 4 + y // 3 + z // 5) % 6] if noise.random() < 0.9 else noise.choice(colours)
+
+
+def dark(noise, dims, size):
+    """Hardly more than void, or as good as void."""
+    for _ in range(dims[0] * dims[1] * dims[2]):
+        yield bytes(noise.choice((0, 0, 0, 0, 1, 2)) for _ in range(size))
+
+
+def wild(noise, dims, size):
+    for _ in range(dims[0] * dims[1] * dims[2]):
+        yield noise.randbytes(size) if noise.random() < 0.8 else bytes(size)
+
+
+CONTENTS = (surfaces, solid, void, clear, few, dark, wild)
+SHAPES = ((8, "on"), (16, "on"), (8, "off"))
+DIMS = ((1, 1, 1), (17, 1, 3), (9, 8, 7), (18, 9, 5), (3, 2, 33))
+
+
+@unittest.skipUnless(BIN, "VOXKIT_BIN is not set")
+class Tools(PackedCase):
+    def check(self, file, data, size):
+        """What both make of it, and that it is no further from the original than it says; returns how it was stored."""
+        packed, voxels = self.compare(file)
+        solids = opaques = 0
+        for at in range(0, len(data), size):
+            old, new = data[at:at + size], voxels[at:at + size]
+            self.assertLessEqual(math.dist(old[:3], new[:3]), packed.max_error + 1e-9)
+            if not any(old):
+                self.assertEqual(new, old)
+            elif size == 4:
+                self.assertEqual(new[3], old[3])
+                solids, opaques = solids + 1, opaques + (new[3] == 255)
+        if size == 4:
+            self.assertEqual(packed.opaque, solids == opaques)
+        seen = {("differences", packed.differences), ("opaque", packed.opaque)}
+        for level, models in enumerate(packed.models):
+            self.assertEqual(models[0].parents, level < packed.count - 1)
+            seen |= {("palette", m.has_palette) for m in models} | {("bound", m.bound > 0) for m in models}
+            for at in itertools.product(*map(range, packed.pages(level))):
+                seen.add(("mask", models[0].parents, min(len(packed.page(level, at, MASK)), 2)))
+        return seen
+
+    def test_contents(self):
+        seen, noise = set(), random.Random(1)
+        shapes, errors = itertools.cycle(SHAPES), itertools.cycle((0, 4, 0, 30, 0))
+        for content, (kind, size), dims in itertools.product(CONTENTS, CHANNELS.items(), DIMS):
+            (side, levels), error = next(shapes), next(errors)
+            data = b"".join(content(noise, dims, size))
+            with self.subTest(content=content.__name__, kind=kind, dims=dims, error=error, page=side, levels=levels):
+                file = self.encode_raw(data, dims, kind, "--max-error", error, "--levels", levels, "--page", side)
+                seen |= self.check(file, data, size)
+        for way in ("differences", "opaque", "palette", "bound"):
+            self.assertLessEqual({(way, False), (way, True)}, seen)
+        self.assertLessEqual({("mask", parents, size) for parents in (False, True) for size in (0, 1, 2)}, seen)
+
+    def test_several_parts(self):
+        """More pages than a part has, most of them void."""
+        dims, noise = (82, 82, 66), random.Random(2)
+        row = noise.randbytes(3 * 82)
+        data = bytes(3 * 82 * 82 * 40) + row * 82 + bytes(3 * 82 * 82 * 24) + row * 82
+        file = self.encode_raw(data, dims, "rgb8", "--page", 8)
+        self.check(file, data, 3)
+        self.assertLessEqual({(kind, 0, part) for kind in (b"PAGE", b"MASK") for part in (0, 1)}, Container(read(file)).chunks.keys())
+
+    def test_built_ins_and_the_program(self):
+        for source, options in (("menger:2", ()), ("menger:3", ("--page", 8)), ("menger:3", ("--levels", "off", "--max-error", 4)),
+                                ("menger:3", ("--max-error", 30)), ("menger:2", ("--page", 8, "--max-error", 0))):
+            with self.subTest(source=source, options=options):
+                file = self.encode(source, *options)
+                self.compare(file)
+                if source != "menger:2":
+                    continue
+                info = json.loads(self.run_program(sys.executable, DECODER, "--info", file).stdout)
+                said = json.loads(self.run_program(os.path.join(BIN, "vox-info"), file, "--json").stdout)
+                for key in ("dims", "voxel_format"):
+                    self.assertEqual(info[key], said[key])
+                last = len(info["levels"]) - 1
+                tool, reference = self.decode_both(DECODER, file, "good.raw", "--level", last)
+                self.assertEqual(tool, reference)
+
+    def test_hand_made_files(self):
+        """What is valid, and what is not, of the small file above."""
+        small = SmallFile()
+        small.setUp()
+        self.assertTrue(self.same_or_refused(container(small.chunks())))
+        bad = b"\5\5\5\5"
+        for name, at, pages in (("masks", 0, (b"", b"\1\0", b"\0", bad, bytes(9))), ("masks", 1, (b"\1", b"\1\0", bad)),
+                                ("coarse_masks", 0, (b"", b"\1", b"\1\0", b"\2", bad)), ("pages", 3, (b"", b"\1\0", bad, bad * 3)),
+                                ("pages", 1, (b"\1", b"\1\1", b"\1\3", b"\1\0\0")), ("coarse_pages", 2, (b"\1", b"\1\1", bad)),
+                                ("pages", 5, (b"\1", bad))):
+            for page in pages:
+                small.setUp()
+                getattr(small, name)[at] = page
+                with self.subTest(name=name, at=at, page=page):
+                    self.same_or_refused(container(small.chunks()))
+        for at, values in ((2, range(1, 6)), (3, (0, 1, 2)), (4, (0, 1, 2))):
+            for value in values:
+                small.setUp()
+                small.pakp[at] = value
+                with self.subTest(at=at, value=value):
+                    self.same_or_refused(container(small.chunks()))
+        small.setUp()
+        for more, valid in (((b"MMOD", 0, 1), False), ((b"MASK", 2, 0), False), ((b"MODL", 1, 4), False), ((b"NEWS", 1, 4), True)):
+            self.assertEqual(self.same_or_refused(container(small.chunks() + [(*more, b"\0")])), valid)
+
+    def test_damage_with_right_checksums(self):
+        noise, seen = random.Random(4), [0, 0]
+        for content, kind, error, dims in ((surfaces, "rgba8", 0, (11, 9, 10)), (clear, "rgba8", 4, (7, 6, 12)),
+                                           (few, "rgb8", 0, (11, 9, 10)), (surfaces, "rgb8", 30, (9, 17, 4)),
+                                           (dark, "rgb8", 4, (5, 9, 5))):
+            data = b"".join(content(noise, dims, CHANNELS[kind]))
+            file = self.encode_raw(data, dims, kind, "--max-error", error, "--page", 8)
+            for kinds in ((b"PAKP", b"MODL", b"MMOD"), (b"MMOD", b"MASK"), (b"MASK", b"PAGE")):
+                with self.subTest(content=content.__name__, kind=kind, error=error):
+                    counts_of = self.damage(file, noise, kinds, 10)
+                    seen = [a + b for a, b in zip(seen, counts_of)]
+        self.assertGreater(min(seen), 10, seen)
+
+
+if __name__ == "__main__":
+    unittest.main()
