@@ -14,6 +14,7 @@ import json
 import math
 import struct
 import sys
+from functools import lru_cache
 
 from container import Container, Refused, Volume, require
 from mask_decode import MaskModel, decode_mask
@@ -24,6 +25,7 @@ INTEGERS, ORDERED, STEPS, COLOURS = 1, 2, 3, 4
 CODES = {1: "integers", 2: "ordered", 3: "steps", 4: "colours"}
 CHANNELS = {"RGBA32": 4, "RGB24": 3}
 MASK = -1  # in place of a channel
+page_model, mask_model = lru_cache(maxsize=64)(Model), lru_cache(maxsize=64)(MaskModel)  # of their bytes
 CODE_BYTES = {"DENSITY8": 1, "DENSITY16": 2, "FLOAT32": 4, "BITMAP": 1}
 GREATEST = {"DENSITY8": 255, "DENSITY16": 65535, "FLOAT32": 2**32 - 1, "BITMAP": 1}
 GREATEST_FLOAT = (2 - 2.0**-23) * 2.0**127
@@ -67,7 +69,7 @@ class Packed:
             if (b"MODL", level, 0) in container.chunks:
                 models, masks = [self.read_model(level, part) for part in range(self.channels)], None
                 if self.volume.colour:
-                    masks = self.named("chunk MMOD {}".format(level), MaskModel, self.content((b"MMOD", level, 0)))
+                    masks = self.named("chunk MMOD {}".format(level), mask_model, self.content((b"MMOD", level, 0)))
                     require(all(m.parents == masks.parents for m in models), "level {}: only some of its models have parents", level)
             self.models.append(models)
             self.masks.append(masks)
@@ -118,7 +120,7 @@ class Packed:
             raise Refused("{}: {}".format(name, error)) from None
 
     def read_model(self, level, part):
-        model = self.named("chunk MODL {}.{}".format(level, part), Model, self.content((b"MODL", level, part)))
+        model = self.named("chunk MODL {}.{}".format(level, part), page_model, self.content((b"MODL", level, part)))
         most = GREATEST.get(self.volume.format) or (510 if self.differences and part in (1, 2) else 255)
         require(model.greatest_sample <= most, "chunk MODL {}.{}: samples up to {}", level, part, model.greatest_sample)
         return model

@@ -28,9 +28,11 @@ class Bits:
         return value & (1 << count) - 1
 
     def golomb(self, k):
-        zeros = 0
-        while not self.get(1):
-            zeros += 1
+        window = int.from_bytes(self.data[self.at // 8:self.at // 8 + 9], "little") >> self.at % 8  # 65 bits or more
+        zeros = (window & -window).bit_length() - 1
+        if window == 0:  # too many zeros, or the end
+            zeros = min(33, 8 * len(self.data) - self.at)
+        self.get(zeros + 1)
         require(k + zeros <= 32, "page model: a number of {} bits", k + zeros)
         value = (1 << k + zeros) - (1 << k) + self.get(k + zeros)
         require(value < 1 << 32, "page model: number {}", value)
