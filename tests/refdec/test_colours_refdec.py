@@ -344,9 +344,10 @@ class Tools(PackedCase):
 
     def test_contents(self):
         seen, noise = set(), random.Random(1)
-        shapes, errors = itertools.cycle(SHAPES), itertools.cycle((0, 4, 0, 30, 0))
-        for content, (kind, size), dims in itertools.product(CONTENTS, CHANNELS.items(), DIMS):
-            (side, levels), error = next(shapes), next(errors)
+        # Of all combinations some.
+        shapes, errors, all_dims = itertools.cycle(SHAPES), itertools.cycle((0, 4, 0, 30)), itertools.cycle(DIMS)
+        for content, (kind, size), _ in itertools.product(CONTENTS, CHANNELS.items(), range(3)):
+            (side, levels), error, dims = next(shapes), next(errors), next(all_dims)
             data = b"".join(content(noise, dims, size))
             with self.subTest(content=content.__name__, kind=kind, dims=dims, error=error, page=side, levels=levels):
                 file = self.encode_raw(data, dims, kind, "--max-error", error, "--levels", levels, "--page", side)
@@ -365,12 +366,12 @@ class Tools(PackedCase):
         self.assertLessEqual({(kind, 0, part) for kind in (b"PAGE", b"MASK") for part in (0, 1)}, Container(read(file)).chunks.keys())
 
     def test_built_ins_and_the_program(self):
-        for source, options in (("menger:2", ()), ("menger:3", ("--page", 8)), ("menger:3", ("--levels", "off", "--max-error", 4)),
-                                ("menger:3", ("--max-error", 30)), ("menger:2", ("--page", 8, "--max-error", 0))):
+        for source, options in (("menger:2", ()), ("menger:2", ("--page", 8, "--max-error", 30)), ("menger:3", ("--page", 8)),
+                                ("menger:3", ("--levels", "off", "--max-error", 4))):
             with self.subTest(source=source, options=options):
                 file = self.encode(source, *options)
                 self.compare(file)
-                if source != "menger:2":
+                if options:
                     continue
                 info = json.loads(self.run_program(sys.executable, DECODER, "--info", file).stdout)
                 said = json.loads(self.run_program(os.path.join(BIN, "vox-info"), file, "--json").stdout)
