@@ -1,4 +1,4 @@
-"""Masks of pages and their models, from section 5.3 of formats/FORMAT.md alone. For packed_decode.py beside this file."""
+"""Masks of pages and their models, from section 5.3 of formats/FORMAT.md alone. For packed_decode.py."""
 
 from functools import lru_cache
 
@@ -35,9 +35,9 @@ class MaskModel:
 
 @lru_cache(maxsize=64)
 def places(shape, parents):
-    """Of each voxel of a page of this shape, in order: its parent, and a constant and the voxels of which its context is,
-    those of the page and those of the parents, each with its bit. `parents`: None, or the shape of their page and where in
-    it those of the page begin."""
+    """Of each voxel of a page of this shape, in order: its parent, and a constant and the voxels of which its context
+    is, those of the page and those of the parents, each with its bit. `parents`: None, or the shape of their page and
+    where in it those of the page begin."""
 
     def inside(points, shape, bit):
         for (x, y, z), b in zip(points, range(bit, 13)):

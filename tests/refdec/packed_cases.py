@@ -101,7 +101,7 @@ class MaskFields:
         return out.bytes()
 
     def page(self, solid):
-        """A mask page, as section 5.3 has it backwards: of each voxel that may be solid its context and whether it is."""
+        """A mask page, as section 5.3 has it backwards: of each voxel that may be solid its context, and if it is."""
         state, words = 1, b""
         for context, is_solid in reversed(solid):
             q = SOLID[self.numbers.get(context, 0)]
@@ -182,8 +182,8 @@ class PackedCase(ToolCase):
         return counts_of
 
     def same_or_refused(self, data):
-        """What both decoders make of a file is the same; returns whether it is anything. Of what a reader may leave unread
-        the tool may not have seen that it is not valid."""
+        """What both decoders make of a file is the same; returns whether it is anything. Of what a reader may leave
+        unread the tool need not have seen that it is not valid."""
         write(self.path("bad.svmm"), data)
         results = []
         for strict in (True, False):
@@ -194,8 +194,8 @@ class PackedCase(ToolCase):
             except Refused as error:
                 results.append(None)
                 why = error
-        done = subprocess.run([os.path.join(BIN, "vox-decode"), self.path("bad.svmm"), "-f", "-o", self.path("bad.raw")],
-                              stderr=subprocess.PIPE)
+        command = [os.path.join(BIN, "vox-decode"), self.path("bad.svmm"), "-f", "-o", self.path("bad.raw")]
+        done = subprocess.run(command, stderr=subprocess.PIPE)
         self.assertIn(done.returncode, (0, 3), done.stderr)
         tool = read(self.path("bad.raw")) if done.returncode == 0 else None
         self.assertTrue(tool in results, done.stderr or (why if results == [None, None] else "other voxels"))

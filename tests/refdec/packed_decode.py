@@ -37,8 +37,8 @@ def divide_up(a, b):
 
 
 class Packed:
-    """Section 2.6: the parameters of a file, its models, and where its pages are. One that is not `strict` leaves unread
-    whatever a reader may."""
+    """Section 2.6: the parameters of a file, its models, and where its pages are. One that is not `strict` leaves
+    unread whatever a reader may."""
 
     def __init__(self, container, strict=True):
         self.strict = strict
@@ -70,7 +70,8 @@ class Packed:
                 models, masks = [self.read_model(level, part) for part in range(self.channels)], None
                 if self.volume.colour:
                     masks = self.named("chunk MMOD {}".format(level), mask_model, self.content((b"MMOD", level, 0)))
-                    require(all(m.parents == masks.parents for m in models), "level {}: only some of its models have parents", level)
+                    require(all(m.parents == masks.parents for m in models),
+                            "level {}: only some of its models have parents", level)
             self.models.append(models)
             self.masks.append(masks)
         require(not models[0].parents, "chunks MODL: the model of level {} has parents", self.count - 1)
@@ -87,10 +88,11 @@ class Packed:
         return (1 << 19) // self.side**3
 
     def check_chunks(self):
-        unused = {key for key in self.container.chunks if key[0] in (b"MODL", b"PAGE") + (b"MMOD", b"MASK") * self.volume.colour}
+        kinds = (b"MODL", b"PAGE") + (b"MMOD", b"MASK") * self.volume.colour
+        unused = {key for key in self.container.chunks if key[0] in kinds}
 
         def use(kind, level, part):
-            require((kind, level, part) in unused, "chunk table: part {} of chunk {} {} is missing", part, kind.decode(), level)
+            require((kind, level, part) in unused, "chunk table: chunk {} {}.{} is missing", kind.decode(), level, part)
             unused.remove((kind, level, part))
 
         for level in range(self.count):
@@ -236,8 +238,9 @@ def describe(packed):
         "voxel_format": volume.format, "sample_type": volume.sample, "spacing": volume.spacing, "origin": volume.origin,
         "slope": volume.slope, "intercept": volume.intercept, "range": volume.range if volume.has_range else None,
         "raw_bytes": math.prod(volume.dims) * volume.voxel_bytes, "file_bytes": len(packed.container.data),
-        "params": {"layout": "packed", "page_side": packed.side, "codes": CODES[packed.codes], "max_error": packed.max_error,
-                   "opaque": bool(packed.opaque), "differences": bool(packed.differences)},
+        "params": {"layout": "packed", "page_side": packed.side, "codes": CODES[packed.codes],
+                   "max_error": packed.max_error, "opaque": bool(packed.opaque),
+                   "differences": bool(packed.differences)},
         "palettes": [[len(m.palette) if m.has_palette else None for m in models] for models in packed.models],
         "levels": [{"index": k, "dims": packed.dims(k), "pages": packed.pages(k)} for k in range(packed.count)],
     }

@@ -229,8 +229,9 @@ def places(shape, parents):
 
 
 def decode_page(model, page, shape, parents=None, mask=None):
-    """The samples of a page of `shape` voxels, x fastest. `parents`, of a model that has them: the samples of their page,
-    its shape, and where in it those of this page begin. `mask`, of a page that has one: of each voxel whether it is solid."""
+    """The samples of a page of `shape` voxels, x fastest. `parents`, of a model that has them: the samples of their
+    page, its shape, and where in it those of this page begin. `mask`, of a page that has one: of each voxel whether it
+    is solid."""
     count = shape[0] * shape[1] * shape[2]
     require(mask is None or not model.wide, "page: a mask beside a wide model")
     if len(page) <= model.value_bytes:
