@@ -165,14 +165,14 @@ class Packed:
         key = level, at, channel
         if key in self.known:
             return self.known[key]
-        page, shape, parents = self.page(level, at, channel), self.shape(level, at), None
+        shape, mask, parents = self.shape(level, at), None, None
         if channel == MASK:
             model, alone = self.masks[level], 0
         else:
             model, mask = self.models[level][channel], self.decoded(level, at, MASK)
             alone = model.value_bytes
-            if not self.strict and mask and not self.page(level, at, MASK):
-                page = b""
+        unread = mask and not self.strict and not self.page(level, at, MASK)
+        page = b"" if unread else self.page(level, at, channel)
         if model.parents and (self.strict or len(page) > alone):
             above = tuple(i // 2 for i in at)
             begin = tuple(i % 2 * self.side // 2 for i in at)

@@ -15,7 +15,7 @@ import unittest
 
 sys.dont_write_bytecode = True
 from container import Container, Refused  # noqa: E402
-from helpers import BIN, HERE, container, read  # noqa: E402
+from helpers import BIN, HERE, container, write  # noqa: E402
 from mask_decode import MaskModel, decode_mask  # noqa: E402
 from packed_cases import BitWriter, Fields, MaskFields, PackedCase  # noqa: E402
 from packed_decode import MASK, Packed, decode  # noqa: E402
@@ -417,6 +417,59 @@ class Tools(PackedCase):
         for kind, index, part, valid in ((b"MMOD", 0, 1, False), (b"MASK", 2, 0, False), (b"MODL", 1, 4, False),
                                          (b"NEWS", 1, 4, True)):
             self.assertEqual(self.same_or_refused(container(small.chunks() + [(kind, index, part, b"\0")])), valid)
+
+    def random_file(self, noise):
+        """Valid, but not as our writer has it: models of any weights, bounds, palettes and numbers, and residuals of any
+        kind. All tables of a model are the same, and all contexts of a mask model have the same number."""
+        dims, size = [noise.randrange(1, 24) for _ in range(3)], noise.choice((3, 4))
+        dims[noise.randrange(3)] = 1 + noise.randrange(4)
+        differences, coarsest = noise.randrange(2), noise.randrange(3)
+        grids = [[-(-d // 8) for d in dims]]
+        while max(grids[-1]) > 1:
+            dims_here = [-(-d // (1 << len(grids))) for d in dims]
+            grids.append([-(-d // 8) for d in dims_here])
+        chunks = [(b"VOLI", 0, 0, struct.pack("<3QBB6x3d3d2d2d", *dims, 5 - size, 1, 1, 1, 1, 0, 0, 0, 1, 0, 0, 0)),
+                  (b"PAKP", 0, 0, struct.pack("<5B3x3d32x", 3, len(grids), 4, 0, differences, 0, 0, 0))]
+        above = {}
+        for level in range(len(grids) - 1, -1, -1):
+            version = 2 if level < len(grids) - 1 - coarsest else 1
+            number, models = noise.randrange(1, 32), []
+            mask_fields = MaskFields(version, {c: number for c in range(8192)})
+            for channel in range(size):
+                most = noise.choice((255, 1, 9, 510 if differences and channel in (1, 2) else 200))
+                palette = sorted(noise.sample(range(256), most + 1)) if most < 10 else None
+                weights = {(noise.randrange(48), noise.randrange(30)): noise.randrange(-3000, 3000) for _ in range(200)}
+                models.append(Fields(version=version, most=most, bound=0 if palette else noise.choice((0, 1, 30)), weights=weights,
+                                     background=noise.randrange(most + 1), palette=palette, parts=(900, 500, 300, 200)))
+            masks, pages, here = [], [], {}
+            dims_here = [-(-d // (1 << level)) for d in dims]
+            for z, y, x in itertools.product(*map(range, grids[level][::-1])):
+                shape = [min(8, d - 8 * i) for i, d in zip((x, y, z), dims_here)]
+                may = [True] * math.prod(shape)
+                if version == 2:
+                    parents, parents_shape = above[x // 2, y // 2, z // 2]
+                    may = [parents[((z % 2 * 4 + k // 2) * parents_shape[1] + y % 2 * 4 + j // 2) * parents_shape[0] +
+                                   x % 2 * 4 + i // 2] for k, j, i in itertools.product(*map(range, shape[::-1]))]
+                way, chance = noise.randrange(6), noise.random()
+                mask = [m and way > 0 and (way == 1 or noise.random() < chance) for m in may]
+                masks.append((b"", b"\1")[way] if way < 2 else mask_fields.page([(0, m) for m, v in zip(mask, may) if v]))
+                here[x, y, z] = mask, shape
+                for model in models:
+                    folded = [noise.choice((0, 0, 1, 2, 3, noise.randrange(200))) for m in mask if m]
+                    one = noise.randrange(model.most + 1).to_bytes(1 if model.most < 256 else 2, "little")
+                    pages.append(noise.choice((b"", one, model.page(folded), model.page(folded))))
+            above = here
+            chunks.append((b"MMOD", level, 0, mask_fields.bytes()))
+            chunks += [(b"MODL", level, c, model.bytes()) for c, model in enumerate(models)]
+            chunks += [(b"MASK", level, 0, SmallFile.part(masks)), (b"PAGE", level, 0, SmallFile.part(pages))]
+        return container(chunks)
+
+    def test_files_of_no_writer(self):
+        noise = random.Random(5)
+        for number in range(12):
+            with self.subTest(number=number):
+                write(self.path("made.svmm"), self.random_file(noise))
+                self.compare(self.path("made.svmm"))
 
     def test_damage_with_right_checksums(self):
         noise, seen = random.Random(4), [0, 0]
