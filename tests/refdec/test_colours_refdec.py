@@ -355,7 +355,7 @@ class Tools(PackedCase):
         seen, noise = set(), random.Random(1)
         # Of all combinations some.
         shapes, errors, all_dims = itertools.cycle(SHAPES), itertools.cycle((0, 4, 0, 30)), itertools.cycle(DIMS)
-        for content, (kind, size), _ in itertools.product(CONTENTS, CHANNELS.items(), range(3)):
+        for content, (kind, size), _ in itertools.product(CONTENTS, CHANNELS.items(), range(2)):
             (side, levels), error, dims = next(shapes), next(errors), next(all_dims)
             data = b"".join(content(noise, dims, size))
             with self.subTest(content=content.__name__, kind=kind, dims=dims, error=error, page=side, levels=levels):
@@ -367,9 +367,8 @@ class Tools(PackedCase):
 
     def test_several_parts(self):
         """More pages than a part has, most of them void."""
-        dims, noise = (82, 82, 66), random.Random(2)
-        row = noise.randbytes(3 * 82)
-        data = bytes(3 * 82 * 82 * 40) + row * 82 + bytes(3 * 82 * 82 * 24) + row * 82
+        dims, noise = (8200, 1, 2), random.Random(2)
+        data = (bytes(3 * 6000) + noise.randbytes(3 * 200) + bytes(3 * 1900) + noise.randbytes(3 * 100)) * 2
         packed, voxels = self.compare(self.encode_raw(data, dims, "rgb8", "--page", 8))
         self.assertEqual(voxels, data)
         for kind, part in itertools.product((b"PAGE", b"MASK"), (0, 1)):
@@ -377,7 +376,7 @@ class Tools(PackedCase):
 
     def test_built_ins_and_the_program(self):
         for source, options in (("menger:2", ()), ("menger:2", ("--page", 8, "--max-error", 30)),
-                                ("menger:3", ("--page", 8)), ("menger:3", ("--levels", "off", "--max-error", 4))):
+                                ("menger:2", ("--levels", "off", "--max-error", 4)), ("menger:3", ("--page", 8))):
             with self.subTest(source=source, options=options):
                 file = self.encode(source, *options)
                 self.compare(file)
@@ -439,8 +438,9 @@ class Tools(PackedCase):
                 most = noise.choice((255, 1, 9, 510 if differences and channel in (1, 2) else 200))
                 palette = sorted(noise.sample(range(256), most + 1)) if most < 10 else None
                 weights = {(noise.randrange(48), noise.randrange(30)): noise.randrange(-3000, 3000) for _ in range(200)}
-                models.append(Fields(version=version, most=most, bound=0 if palette else noise.choice((0, 1, 30)), weights=weights,
-                                     background=noise.randrange(most + 1), palette=palette, parts=(900, 500, 300, 200)))
+                models.append(Fields(version=version, most=most, bound=0 if palette else noise.choice((0, 1, 30)),
+                                     background=noise.randrange(most + 1), palette=palette, weights=weights,
+                                     parts=(900, 500, 300, 200)))
             masks, pages, here = [], [], {}
             dims_here = [-(-d // (1 << level)) for d in dims]
             for z, y, x in itertools.product(*map(range, grids[level][::-1])):
@@ -466,7 +466,7 @@ class Tools(PackedCase):
 
     def test_files_of_no_writer(self):
         noise = random.Random(5)
-        for number in range(12):
+        for number in range(10):
             with self.subTest(number=number):
                 write(self.path("made.svmm"), self.random_file(noise))
                 self.compare(self.path("made.svmm"))
@@ -480,7 +480,7 @@ class Tools(PackedCase):
             file = self.encode_raw(data, dims, kind, "--max-error", error, "--page", 8)
             for kinds in ((b"PAKP", b"MODL", b"MMOD"), (b"MMOD", b"MASK"), (b"MASK", b"PAGE")):
                 with self.subTest(content=content.__name__, kind=kind, error=error):
-                    counts_of = self.damage(file, noise, kinds, 8)
+                    counts_of = self.damage(file, noise, kinds, 7)
                     seen = [a + b for a, b in zip(seen, counts_of)]
         self.assertGreater(min(seen), 10, seen)
 
