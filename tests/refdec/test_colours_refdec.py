@@ -452,7 +452,8 @@ class Tools(PackedCase):
                                    x % 2 * 4 + i // 2] for k, j, i in itertools.product(*map(range, shape[::-1]))]
                 way, chance = noise.randrange(6), noise.random()
                 mask = [m and way > 0 and (way == 1 or noise.random() < chance) for m in may]
-                masks.append((b"", b"\1")[way] if way < 2 else mask_fields.page([(0, m) for m, v in zip(mask, may) if v]))
+                coded = mask_fields.page([(0, m) for m, v in zip(mask, may) if v])
+                masks.append((b"", b"\1", coded, coded, coded, coded)[way])
                 here[x, y, z] = mask, shape
                 for model in models:
                     folded = [noise.choice((0, 0, 1, 2, 3, noise.randrange(200))) for m in mask if m]
