@@ -9,17 +9,23 @@ of FORMAT.md. Exit codes: 0 done, 2 usage, 3 the file is unreadable, corrupt or 
 """
 
 import argparse
+import itertools
 import json
 import math
 import struct
 import sys
+from functools import lru_cache
 
 from container import Container, Refused, Volume, require
+from mask_decode import MaskModel, decode_mask
 from page_decode import Model, decode_page
 
 SVMM = 1
-INTEGERS, ORDERED, STEPS = 1, 2, 3
-CODES = {1: "integers", 2: "ordered", 3: "steps"}
+INTEGERS, ORDERED, STEPS, COLOURS = 1, 2, 3, 4
+CODES = {1: "integers", 2: "ordered", 3: "steps", 4: "colours"}
+CHANNELS = {"RGBA32": 4, "RGB24": 3}
+MASK = -1  # in place of a channel
+page_model, mask_model = lru_cache(maxsize=64)(Model), lru_cache(maxsize=64)(MaskModel)  # of their bytes
 CODE_BYTES = {"DENSITY8": 1, "DENSITY16": 2, "FLOAT32": 4, "BITMAP": 1}
 GREATEST = {"DENSITY8": 255, "DENSITY16": 65535, "FLOAT32": 2**32 - 1, "BITMAP": 1}
 GREATEST_FLOAT = (2 - 2.0**-23) * 2.0**127
@@ -31,35 +37,45 @@ def divide_up(a, b):
 
 
 class Packed:
-    """Section 2.6: the parameters of a file, its models, and where its pages are."""
+    """Section 2.6: the parameters of a file, its models, and where its pages are. One that is not `strict` leaves
+    unread whatever a reader may."""
 
-    def __init__(self, container):
+    def __init__(self, container, strict=True):
+        self.strict = strict
         require(container.codec == SVMM, "header: byte 10: codec {}, expected 1 (SVMM)", container.codec)
         self.container, self.volume = container, Volume(container)
         chunk = container.only(b"PAKP")
         at = chunk.offset
         require(chunk.length == 64, "chunk PAKP: byte {}: {} bytes, expected 64", at, chunk.length)
-        log_side, self.count, self.codes = container.unpack("<3B", at)
+        log_side, self.count, self.codes, self.opaque, self.differences = container.unpack("<5B", at)
         self.lo, self.step, self.max_error = container.unpack("<3d", at + 8)
         fmt = self.volume.format
-        require(fmt in CODE_BYTES, "chunk VOLI: layout packed with {}", fmt)
+        self.channels = CHANNELS.get(fmt, 1)
         require(log_side in (3, 4), "chunk PAKP: byte {}: pages of 2^{}", at, log_side)
         self.side = 1 << log_side
         most = 1
         while max(self.dims(most - 1)) > self.side:
             most += 1
         require(self.count in (1, most), "chunk PAKP: byte {}: {} levels, expected 1 or {}", at + 1, self.count, most)
-        require(self.codes in ((ORDERED, STEPS) if fmt == "FLOAT32" else (INTEGERS,)), "chunk PAKP: byte {}: codes {} of {}",
-                at + 2, self.codes, fmt)
+        codes = (ORDERED, STEPS) if fmt == "FLOAT32" else (COLOURS,) if self.volume.colour else (INTEGERS,)
+        require(self.codes in codes, "chunk PAKP: byte {}: codes {} of {}", at + 2, self.codes, fmt)
+        require(self.opaque <= (fmt == "RGBA32"), "chunk PAKP: byte {}: {} of {}", at + 3, self.opaque, fmt)
+        require(self.differences <= self.volume.colour, "chunk PAKP: byte {}: {} of {}", at + 4, self.differences, fmt)
         require(self.codes != STEPS or math.isfinite(self.lo) and 0 < self.step < math.inf,
                 "chunk PAKP: byte {}: steps of {} from {}", at + 8, self.step, self.lo)
         self.check_chunks()
-        self.models = []  # of each level
+        self.models, self.masks = [], []  # of each level: the models of its channels, and that of its masks or None
         for level in range(self.count):
-            own = (b"MODL", level, 0) in container.chunks
-            self.models.append(self.read_model(level) if own else self.models[-1])
-        require(not self.models[-1].parents, "chunks MODL: the model of level {} has parents", self.count - 1)
-        self.known = {}  # levels that were decoded, as codes
+            if (b"MODL", level, 0) in container.chunks:
+                models, masks = [self.read_model(level, part) for part in range(self.channels)], None
+                if self.volume.colour:
+                    masks = self.named("chunk MMOD {}".format(level), mask_model, self.content((b"MMOD", level, 0)))
+                    require(all(m.parents == masks.parents for m in models),
+                            "level {}: only some of its models have parents", level)
+            self.models.append(models)
+            self.masks.append(masks)
+        require(not models[0].parents, "chunks MODL: the model of level {} has parents", self.count - 1)
+        self.known, self.parts = {}, {}  # pages that were decoded, and parts that were read
 
     def dims(self, level):
         return tuple(divide_up(d, 1 << level) for d in self.volume.dims)
@@ -72,35 +88,52 @@ class Packed:
         return (1 << 19) // self.side**3
 
     def check_chunks(self):
-        unused = {key for key in self.container.chunks if key[0] in (b"MODL", b"PAGE")}
-        require((b"MODL", 0, 0) in unused, "chunk table: chunk MODL 0 is missing")
-        unused -= {(b"MODL", level, 0) for level in range(self.count)}
+        kinds = (b"MODL", b"PAGE") + (b"MMOD", b"MASK") * self.volume.colour
+        unused = {key for key in self.container.chunks if key[0] in kinds}
+
+        def use(kind, level, part):
+            require((kind, level, part) in unused, "chunk table: chunk {} {}.{} is missing", kind.decode(), level, part)
+            unused.remove((kind, level, part))
+
         for level in range(self.count):
+            if level == 0 or any(key[0] in (b"MODL", b"MMOD") and key[1] == level for key in unused):
+                for part in range(self.channels):
+                    use(b"MODL", level, part)
+                if self.volume.colour:
+                    use(b"MMOD", level, 0)
             parts = divide_up(math.prod(self.pages(level)), self.part_pages())
             require(parts <= len(unused), "chunk table: level {}: parts of chunk PAGE are missing", level)
             for part in range(parts):
-                require((b"PAGE", level, part) in unused, "chunk table: level {}: part {} of chunk PAGE is missing", level, part)
-                unused.remove((b"PAGE", level, part))
-        require(not unused, "chunk table: {} chunks MODL or PAGE belong to no level", len(unused))
+                use(b"PAGE", level, part)
+                if self.volume.colour:
+                    use(b"MASK", level, part)
+        require(not unused, "chunk table: {} chunks of pages or models belong to no level", len(unused))
 
     def content(self, key):
         chunk = self.container.chunks[key]
         return bytes(self.container.data[chunk.offset:chunk.offset + chunk.length])
 
-    def read_model(self, index):
+    @staticmethod
+    def named(name, read, *values):
+        """What `read` makes of the values; its refusals say where."""
         try:
-            model = Model(self.content((b"MODL", index, 0)))
+            return read(*values)
         except Refused as error:
-            raise Refused("chunk MODL {}: {}".format(index, error)) from None
-        require(model.greatest_sample <= GREATEST[self.volume.format], "chunk MODL {}: samples up to {}", index,
-                model.greatest_sample)
+            raise Refused("{}: {}".format(name, error)) from None
+
+    def read_model(self, level, part):
+        model = self.named("chunk MODL {}.{}".format(level, part), page_model, self.content((b"MODL", level, part)))
+        most = GREATEST.get(self.volume.format) or (510 if self.differences and part in (1, 2) else 255)
+        require(model.greatest_sample <= most, "chunk MODL {}.{}: samples up to {}", level, part, model.greatest_sample)
         return model
 
-    def read_part(self, level, part):
-        """The bytes of its pages."""
-        data = self.content((b"PAGE", level, part))
-        count = min(self.part_pages(), math.prod(self.pages(level)) - part * self.part_pages())
-        where = "chunk PAGE {}.{}: ".format(level, part)
+    def read_part(self, kind, level, part, entries):
+        """The bytes of its pages, of each `entries` in turn."""
+        if (kind, level, part) in self.parts:
+            return self.parts[kind, level, part]
+        data = self.content((kind, level, part))
+        count = entries * min(self.part_pages(), math.prod(self.pages(level)) - part * self.part_pages())
+        where = "chunk {} {}.{}: ".format(kind.decode(), level, part)
         require(data and data[0] <= 24, where + "lengths of too many bits")
         width = data[0]
         at = 1 + divide_up(count * width, 8)
@@ -111,34 +144,66 @@ class Packed:
             pages.append(data[at:at + length])
             at += length
         require(at == len(data), where + "lengths of pages that do not add up")
+        self.parts[kind, level, part] = pages
         return pages
 
-    def codes_of(self, level):
-        """Of each page of a level: its corner, its shape and its codes."""
-        if level in self.known:
-            return self.known[level]
-        dims, grid, side, model = self.dims(level), self.pages(level), self.side, self.models[level]
-        if model.parents:
-            above, above_grid = self.codes_of(level + 1), self.pages(level + 1)
-        out = []
-        for part in range(divide_up(math.prod(grid), self.part_pages())):
-            for page in self.read_part(level, part):
-                x, y, z = len(out) % grid[0], len(out) // grid[0] % grid[1], len(out) // (grid[0] * grid[1])
-                corner = side * x, side * y, side * z
-                shape = tuple(min(side, d - c) for c, d in zip(corner, dims))
-                parents = None
-                if model.parents:
-                    _, parents_shape, parents = above[(z // 2 * above_grid[1] + y // 2) * above_grid[0] + x // 2]
-                    parents = parents, parents_shape, tuple(i % 2 * side // 2 for i in (x, y, z))
-                try:
-                    out.append((corner, shape, decode_page(model, page, shape, parents)))
-                except Refused as error:
-                    raise Refused("level {}, page at {}: {}".format(level, corner, error)) from None
-        self.known[level] = out
-        return out
+    def page(self, level, at, channel):
+        """The bytes of a channel of page `at`, or of its mask."""
+        grid = self.pages(level)
+        part, number = divmod((at[2] * grid[1] + at[1]) * grid[0] + at[0], self.part_pages())
+        if channel == MASK:
+            return self.read_part(b"MASK", level, part, 1)[number]
+        return self.read_part(b"PAGE", level, part, self.channels)[number * self.channels + channel]
+
+    def shape(self, level, at):
+        return tuple(min(self.side, d - self.side * i) for i, d in zip(at, self.dims(level)))
+
+    def decoded(self, level, at, channel):
+        """Of a page the samples of a channel; or its mask, which scalars have none of."""
+        if channel == MASK and not self.volume.colour:
+            return None
+        key = level, at, channel
+        if key in self.known:
+            return self.known[key]
+        shape, mask, parents = self.shape(level, at), None, None
+        if channel == MASK:
+            model, alone = self.masks[level], 0
+        else:
+            model, mask = self.models[level][channel], self.decoded(level, at, MASK)
+            alone = model.value_bytes
+        unread = mask and not self.strict and not self.page(level, at, MASK)
+        page = b"" if unread else self.page(level, at, channel)
+        if model.parents and (self.strict or len(page) > alone):
+            above = tuple(i // 2 for i in at)
+            begin = tuple(i % 2 * self.side // 2 for i in at)
+            parents = self.decoded(level + 1, above, channel), self.shape(level + 1, above), begin
+        name = "level {}, page at {}".format(level, tuple(self.side * i for i in at))
+        if channel == MASK:
+            self.known[key] = self.named(name, decode_mask, model, page, shape, parents)
+        else:
+            self.known[key] = self.named(name, decode_page, model, page, shape, parents, mask)
+        return self.known[key]
+
+    def voxels(self, level, at):
+        """The bytes of each voxel of a page."""
+        mask = self.decoded(level, at, MASK)
+        samples = [self.decoded(level, at, c) for c in range(self.channels)]
+        if mask is None:
+            known, codes = {}, samples[0]
+        else:
+            known = {None: bytes(self.channels)}
+            codes = [code if solid else None for code, solid in zip(zip(*samples), mask)]
+        for code in set(codes) - known.keys():
+            known[code] = self.stored(code)
+        return [known[code] for code in codes]
 
     def stored(self, code):
-        """The bytes of a voxel."""
+        """The bytes of a voxel, of colours of a solid one."""
+        if self.codes == COLOURS:
+            green, red, blue, *alpha = code
+            if self.differences:
+                red, blue = red + green - 255, blue + green - 255
+            return bytes(min(max(c, 0), 255) for c in (red, green, blue, *alpha))
         if self.codes == INTEGERS:
             return code.to_bytes(CODE_BYTES[self.volume.format], "little")
         if self.codes == ORDERED:
@@ -152,15 +217,14 @@ class Packed:
 def decode(packed, level):
     """The voxels of a level."""
     dims, size = packed.dims(level), packed.volume.voxel_bytes
-    out, known = bytearray(math.prod(dims) * size), {}
-    for corner, shape, codes in packed.codes_of(level):
-        for code in set(codes) - known.keys():
-            known[code] = packed.stored(code)
+    out = bytearray(math.prod(dims) * size)
+    for z, y, x in itertools.product(*map(range, packed.pages(level)[::-1])):
+        shape, voxels = packed.shape(level, (x, y, z)), packed.voxels(level, (x, y, z))
+        corner = [packed.side * i for i in (x, y, z)]
         for row in range(shape[1] * shape[2]):
             y, z = corner[1] + row % shape[1], corner[2] + row // shape[1]
             at = ((z * dims[1] + y) * dims[0] + corner[0]) * size
-            voxels = b"".join(known[code] for code in codes[row * shape[0]:(row + 1) * shape[0]])
-            out[at:at + len(voxels)] = voxels
+            out[at:at + shape[0] * size] = b"".join(voxels[row * shape[0]:(row + 1) * shape[0]])
     return out
 
 
@@ -174,8 +238,10 @@ def describe(packed):
         "voxel_format": volume.format, "sample_type": volume.sample, "spacing": volume.spacing, "origin": volume.origin,
         "slope": volume.slope, "intercept": volume.intercept, "range": volume.range if volume.has_range else None,
         "raw_bytes": math.prod(volume.dims) * volume.voxel_bytes, "file_bytes": len(packed.container.data),
-        "params": {"layout": "packed", "page_side": packed.side, "codes": CODES[packed.codes], "max_error": packed.max_error},
-        "palettes": [len(m.palette) if m.has_palette else None for m in packed.models],
+        "params": {"layout": "packed", "page_side": packed.side, "codes": CODES[packed.codes],
+                   "max_error": packed.max_error, "opaque": bool(packed.opaque),
+                   "differences": bool(packed.differences)},
+        "palettes": [[len(m.palette) if m.has_palette else None for m in models] for models in packed.models],
         "levels": [{"index": k, "dims": packed.dims(k), "pages": packed.pages(k)} for k in range(packed.count)],
     }
 

@@ -28,9 +28,11 @@ class Bits:
         return value & (1 << count) - 1
 
     def golomb(self, k):
-        zeros = 0
-        while not self.get(1):
-            zeros += 1
+        window = int.from_bytes(self.data[self.at // 8:self.at // 8 + 9], "little") >> self.at % 8  # 65 bits or more
+        zeros = (window & -window).bit_length() - 1
+        if window == 0:  # too many zeros, or the end
+            zeros = min(33, 8 * len(self.data) - self.at)
+        self.get(zeros + 1)
         require(k + zeros <= 32, "page model: a number of {} bits", k + zeros)
         value = (1 << k + zeros) - (1 << k) + self.get(k + zeros)
         require(value < 1 << 32, "page model: number {}", value)
@@ -226,10 +228,12 @@ def places(shape, parents):
     return out
 
 
-def decode_page(model, page, shape, parents=None):
-    """The samples of a page of `shape` voxels, x fastest. `parents`, of a model that has them: the samples of their page,
-    its shape, and where in it those of this page begin."""
+def decode_page(model, page, shape, parents=None, mask=None):
+    """The samples of a page of `shape` voxels, x fastest. `parents`, of a model that has them: the samples of their
+    page, its shape, and where in it those of this page begin. `mask`, of a page that has one: of each voxel whether it
+    is solid."""
     count = shape[0] * shape[1] * shape[2]
+    require(mask is None or not model.wide, "page: a mask beside a wide model")
     if len(page) <= model.value_bytes:
         require(len(page) in (0, model.value_bytes), "page: {} bytes, expected {}", len(page), model.value_bytes)
         value = int.from_bytes(page, "little") if page else model.background
@@ -240,11 +244,16 @@ def decode_page(model, page, shape, parents=None):
     values = [model.nearest(sample) for sample in parents[0]] if model.parents else []
     skip, state, magnitudes = len(values), State(page), [0] * len(values)
     step = 2 * model.bound + 1
-    for c, taps, spans, near, left, table in places(shape, parents[1:] if model.parents else None):
+    shape_of_parents = parents[1:] if model.parents else None
+    for (c, taps, spans, near, left, table), solid in zip(places(shape, shape_of_parents), mask or [True] * count):
         first = not values  # of all, without parents
         # 1. Prediction.
         total = 4096 * model.background if first else sum(weight * values[taps[t]] for t, weight in model.weights[c])
         predicted = min(max((total + 2047) // 4096, 0), model.most)
+        if not solid:
+            values.append(predicted)
+            magnitudes.append(0)
+            continue
         mirrored = (total + 2047) % 4096 >= 2048
         # 2. Context.
         shares = 0

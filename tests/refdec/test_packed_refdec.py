@@ -10,89 +10,20 @@ import math
 import os
 import random
 import struct
-import subprocess
 import sys
 import unittest
 
 sys.dont_write_bytecode = True
 from container import Container, Refused  # noqa: E402
-from helpers import BIN, HERE, ToolCase, container, raw_file, read, write  # noqa: E402
+from helpers import BIN, HERE, container, raw_file, read, write  # noqa: E402
+from packed_cases import BitWriter, Fields, PackedCase, few, smooth  # noqa: E402
 from packed_decode import Packed, decode  # noqa: E402
-from page_decode import Model, counts, decode_page, lacks, rest_tap  # noqa: E402
+from page_decode import Model, decode_page  # noqa: E402
 
 DECODER = os.path.join(HERE, "packed_decode.py")
 
 
 # ---- Without tools ---------------------------------------------------------------------------------------------------
-
-
-class BitWriter:
-    def __init__(self):
-        self.bits = []
-
-    def put(self, value, count):
-        self.bits += [value >> i & 1 for i in range(count)]
-        return self
-
-    def golomb(self, value, k):
-        zeros = (value + (1 << k)).bit_length() - 1 - k
-        return self.put(1 << zeros, zeros + 1).put(value + (1 << k) - (1 << k + zeros), k + zeros)
-
-    def signed_golomb(self, value, k):
-        return self.golomb(2 * value if value >= 0 else -2 * value - 1, k)
-
-    def bytes(self):
-        return bytes(sum(bit << i for i, bit in enumerate(self.bits[at:at + 8])) for at in range(0, len(self.bits), 8))
-
-
-class Fields:
-    """A model whose weights are all on the rest taps, unless `weights` has others by (class, tap), and whose tables are
-    all the same. Version 2 has parents."""
-
-    def __init__(self, **changes):
-        self.version, self.most, self.bound, self.background, self.palette = 1, 9, 1, 5, None
-        self.weights, self.parts, self.first_same, self.more = {}, (1000, 500, 500), 0, 0
-        for name, value in changes.items():
-            setattr(self, name, value)
-
-    def bytes(self):
-        out = BitWriter().put(self.version, 8).put(self.palette is not None, 1).put(self.most, 32)
-        out.golomb(self.bound, 0).golomb(self.background, 8)
-        before = -1
-        for entry in self.palette or ():
-            out.golomb(entry - before - 1, 2)
-            before = entry
-        parents = self.version == 2
-        classes, taps, tables = counts(parents)
-        for c in range(classes):
-            for t in range(taps):
-                if not lacks(c, t, parents) and t != rest_tap(c, parents):
-                    out.signed_golomb(self.weights.get((c, t), 0), 7)
-        out.put(self.first_same, 1)
-        if not self.first_same:
-            out.put(len(self.parts), 7)
-            before = 512
-            for part in self.parts:
-                out.golomb(part, max(0, before.bit_length() - 2))
-                before = part
-        out.put((1 << tables - 1) - 1, tables - 1)
-        if self.more:
-            out.put(self.more, 8)
-        return out.bytes()
-
-    def page(self, folded):
-        """A page of these folded residuals, as section 5.2 has it backwards; narrow models, symbols below 16."""
-        parts = list(self.parts) + [0] * (72 - len(self.parts)) + [2048 - sum(self.parts)]
-        state, words = 1, b""
-        for f in reversed(folded):
-            s, bits = (f, 0) if f < 16 and parts[f] else (72, 17)
-            if state << bits << 11 >= parts[s] << 64:
-                words += struct.pack("<I", state & 0xffffffff)
-                state >>= 32
-            state = state << bits | (f if bits else 0)
-            state = (state // parts[s] << 11) + state % parts[s] + sum(parts[:s])
-        least = 1 if self.most < 256 else 2
-        return state.to_bytes(max((state.bit_length() + 7) // 8, 0 if words else least + 1), "little") + words
 
 
 class Models(unittest.TestCase):
@@ -300,9 +231,10 @@ class SmallFile(unittest.TestCase):
 
     def test_field_rules(self):
         for chunk, layout, offset, value, rule in (
-                ("voli", "<B", 24, 1, "with RGBA32"), ("pakp", "<B", 0, 2, "pages of 2"), ("pakp", "<B", 0, 5, "pages of 2"),
+                ("voli", "<B", 24, 1, "codes 1 of RGBA32"), ("pakp", "<B", 0, 2, "pages of 2"), ("pakp", "<B", 0, 5, "pages of 2"),
                 ("pakp", "<B", 0, 3, "levels, expected 1 or 3"), ("pakp", "<B", 1, 0, "levels"), ("pakp", "<B", 1, 3, "levels"),
                 ("pakp", "<B", 1, 1, "belong to no level"), ("pakp", "<B", 2, 0, "codes"), ("pakp", "<B", 2, 2, "codes"),
+                ("pakp", "<B", 2, 4, "codes"), ("pakp", "<B", 3, 1, "1 of DENSITY8"), ("pakp", "<B", 4, 1, "1 of DENSITY8"),
                 ("pages", "<B", 0, 25, "too many bits"), ("pages", "<B", 0, 24, "add up"), ("pages", "<B", 1, 1, "add up")):
             self.setUp()
             struct.pack_into(layout, getattr(self, chunk), offset, value)
@@ -345,19 +277,6 @@ DIMS = ((1, 1, 1), LARGEST, (1, 40, 2), (9, 8, 7))
 SHAPES = ((16, "on"), (8, "on"), (8, "off"))
 
 
-def smooth(noise, dims, most):
-    """Waves and a little noise, of whole numbers from 0 to most; some voxels are far off."""
-    for z, y, x in itertools.product(*map(range, dims[::-1])):
-        wave = math.sin(x / 5 + y / 7) + math.cos(z / 6 - y / 9)
-        yield noise.randrange(most + 1) if noise.random() < 0.01 else int((wave + 2) / 4 * (most - 3)) + noise.randrange(3)
-
-
-def few(noise, dims, most):
-    values = sorted(noise.randrange(most + 1) for _ in range(5))
-    for z, y, x in itertools.product(*map(range, dims[::-1])):
-        yield values[(x // 4 + y // 3 + z // 5) % 4 if noise.random() < 0.9 else 4]
-
-
 def constant(noise, dims, most):
     value = noise.randrange(most + 1)
     return (value for _ in range(dims[0] * dims[1] * dims[2]))
@@ -378,34 +297,7 @@ KINDS = (("u8", 255, (0, 1, 7)), ("i8", 255, (0,)), ("u16", 65535, (0, 300)), ("
 
 
 @unittest.skipUnless(BIN, "VOXKIT_BIN is not set")
-class Tools(ToolCase):
-    def encode(self, source, *options):
-        """Without loss unless the options say otherwise."""
-        options = options if "--max-error" in options else (*options, "--max-error", 0)
-        self.run_program(os.path.join(BIN, "svmm-encode"), source, "-f", "-o", self.path("x.svmm"), "--layout", "packed",
-                         *options)
-        return self.path("x.svmm")
-
-    def encode_raw(self, data, dims, kind, *options):
-        write(self.path("in.raw"), data)
-        return self.encode(self.path("in.raw"), "--dims", "%d,%d,%d" % dims, "--type", kind, *options)
-
-    def compare(self, file):
-        """All levels, decoded by both; returns the reference decoder's view of the file, and the voxels of level 0."""
-        packed = Packed(Container(read(file)))
-        first = None
-        for level in range(packed.count):
-            with self.subTest(level=level):
-                self.run_program(os.path.join(BIN, "vox-decode"), file, "-f", "-o", self.path("tool.raw"), "--level", level)
-                tool = read(self.path("tool.raw"))
-                reference = raw_file(packed.volume.samples(decode(packed, level)), packed.volume.sample)
-                first = reference if first is None else first
-                if tool != reference:
-                    self.assertEqual(len(tool), len(reference))
-                    different = [at for at in range(len(tool)) if tool[at] != reference[at]]
-                    self.fail("{} bytes differ, the first at {}".format(len(different), different[0]))
-        return packed, first
-
+class Tools(PackedCase):
     def test_sample_types(self):
         noise = random.Random(1)
         seen = set()
@@ -425,9 +317,9 @@ class Tools(ToolCase):
                     self.assertEqual(packed.side, side)
                     if error == 0:
                         self.assertEqual(voxels, data)
-                    seen |= {(packed.codes, packed.models[0].wide, packed.models[0].has_palette, packed.models[0].bound > 0)}
+                    seen |= {(packed.codes, packed.models[0][0].wide, packed.models[0][0].has_palette, packed.models[0][0].bound > 0)}
                     # All levels but the coarsest have parents; the levels between have one model.
-                    self.assertEqual([m.parents for m in packed.models], [True] * (packed.count - 1) + [False])
+                    self.assertEqual([m[0].parents for m in packed.models], [True] * (packed.count - 1) + [False])
                     own = {index for kind_of_chunk, index, _ in packed.container.chunks if kind_of_chunk == b"MODL"}
                     self.assertEqual(own, {0, min(1, packed.count - 1), packed.count - 1})
         # Every way of a page was gone.
@@ -444,7 +336,7 @@ class Tools(ToolCase):
         waves = [1000 * v + noise.random() for v in smooth(noise, dims, 20000)]
         waves[5:8] = math.nan, math.inf, -math.inf
         packed, _ = self.compare(self.encode_raw(struct.pack("<990f", *waves), dims, "f32", "--max-error", 4))
-        self.assertEqual((packed.codes, packed.models[0].wide), (3, True))
+        self.assertEqual((packed.codes, packed.models[0][0].wide), (3, True))
         names = [noise.choice((7, 4000000000, 65536, 12)) for _ in range(990)]
         packed, voxels = self.compare(self.encode_raw(struct.pack("<990I", *names), dims, "u32", "--labels"))
         self.assertEqual(voxels, struct.pack("<990I", *names))
@@ -502,33 +394,10 @@ class Tools(ToolCase):
                                            ("f32", smooth, 20000, 0), ("f32", smooth, 20000, 0.01)):
             values = list(content(noise, dims, most))
             data = as_raw([v + noise.random() for v in values] if kind == "f32" else values, kind)
-            good = Container(read(self.encode_raw(data, dims, kind, "--max-error", error, "--page", 8)))
-            chunks = [[*key, bytes(good.data[c.offset:c.offset + c.length])] for key, c in good.chunks.items()]
-            places = [i for i, c in enumerate(chunks) if c[0] in (b"PAKP", b"MODL", b"PAGE")]
-            for change in range(25):
-                changed = [list(c) for c in chunks]
-                chunk = changed[noise.choice(places)]
-                content_bytes = bytearray(chunk[3])
-                for _ in range(1 + noise.randrange(2)):
-                    at = noise.randrange(min(len(content_bytes), 300) if noise.random() < 0.5 else len(content_bytes))
-                    content_bytes[at] = noise.choice((content_bytes[at] ^ 1 << noise.randrange(8), noise.randrange(256)))
-                if noise.random() < 0.1:
-                    del content_bytes[noise.randrange(len(content_bytes)):]
-                chunk[3] = bytes(content_bytes)
-                file = container(changed, version=good.version)
-                write(self.path("bad.svmm"), file)
-                with self.subTest(kind=kind, error=error, change=change, chunk=chunk[:3]):
-                    try:
-                        packed = Packed(Container(file))
-                        reference = raw_file(packed.volume.samples(decode(packed, 0)), packed.volume.sample)
-                    except Refused:
-                        reference = None
-                    tool = subprocess.run([os.path.join(BIN, "vox-decode"), self.path("bad.svmm"), "-f", "-o", self.path("bad.raw")],
-                                          stderr=subprocess.PIPE)
-                    self.assertEqual(tool.returncode, 0 if reference else 3, tool.stderr)
-                    if reference:
-                        self.assertEqual(read(self.path("bad.raw")), reference)
-                    refused, same = refused + (reference is None), same + (reference is not None)
+            with self.subTest(kind=kind, error=error):
+                file = self.encode_raw(data, dims, kind, "--max-error", error, "--page", 8)
+                counts_of = self.damage(file, noise, (b"PAKP", b"MODL", b"PAGE"), 25)
+                refused, same = refused + counts_of[0], same + counts_of[1]
         self.assertGreater(min(refused, same), 10)
 
 
