@@ -1,4 +1,6 @@
 // Casting packed volumes of colours, from their files: masks first, then the colours of what was hit.
+#include <fmt/format.h>
+
 #include "formats/clock.h"
 #include "formats/parallel.h"
 #include "librender/cast/cast_tile.h"
@@ -11,6 +13,7 @@ namespace {
 Status look_up(const svmm::PackedVolume& volume, Frame& frame, Context& ctx) {
   const auto start = Clock::now();
   const ColorOf color_of(VoxelFormat::rgba32, {});
+  const bool has_alpha = volume.info().format == VoxelFormat::rgba32;
   constexpr int64_t side = 32;  // of tiles: neighbours are mostly in one page
   const int64_t across = (frame.width + side - 1) / side, down = (frame.height + side - 1) / side;
   VOX_CHECK(parallel_for(ctx, across * down, [&](int64_t tile) -> Status {
@@ -22,6 +25,10 @@ Status look_up(const svmm::PackedVolume& volume, Frame& frame, Context& ctx) {
         const int32_t(&voxel)[3] = frame.details[i].voxel;
         if (voxel[0] < 0) continue;
         VOX_TRY(const Voxel value, reader.at({voxel[0], voxel[1], voxel[2]}));
+        if (has_alpha && value.as<uint32_t>() >> 24 != 255)
+          return bad_input(volume.container().name(),
+                           fmt::format("chunk PAKP, byte 3: voxel {},{},{} is not opaque: expected all to be",
+                                       voxel[0], voxel[1], voxel[2]));
         const Color seen = color_of(Voxel::of(value.as<uint32_t>() | 0xff000000u));
         for (int k = 0; k < 3; ++k) frame.pixels[i].color[k] = seen.rgb[k];
       }

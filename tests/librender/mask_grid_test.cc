@@ -8,6 +8,8 @@
 
 #include "librender/camera.h"
 #include "librender/cast/ray_cast.h"
+#include "libsvmm/packed/packed_layout.h"
+#include "tests/damage.h"
 #include "tests/memory_volume.h"
 
 namespace voxkit::render {
@@ -167,6 +169,43 @@ TEST(MaskGrid, OnlyPagesThatAreSeenAreDecoded) {
   const uint64_t once = (*volume)->pages_decoded();
   ASSERT_TRUE(cast(*grid, Camera::orbit(0, 0, 1.5, 45), options, frame, f.ctx));
   EXPECT_EQ((*volume)->pages_decoded(), once);
+}
+
+/// A file may say that all is opaque, and not be so.
+TEST(MaskGrid, WhatIsNotOpaqueAfterAllIsDamage) {
+  Fixture f;
+  const VolumeInfo info = info_of({8, 8, 8}, VoxelFormat::rgba32);
+  auto voxels = voxels_of(5, info.dims, 4);
+  for (size_t i = 3; i < voxels.size(); i += 4) voxels[i] = std::byte{254};
+  test::MemorySource source(info, voxels);
+  std::vector<std::byte> file;
+  ASSERT_TRUE(svmm::encode_packed(
+      source, {},
+      [&](std::span<const std::byte> part) -> Status {
+        file.insert(file.end(), part.begin(), part.end());
+        return {};
+      },
+      f.ctx));
+  const auto honest = Container::open(file, "file", std::make_shared<std::vector<std::byte>>(file));
+  ASSERT_TRUE(honest);
+  const auto params = std::ranges::find((*honest)->table(), svmm::packed_kind, &ChunkEntry::kind);
+  ASSERT_NE(params, (*honest)->table().end());
+  file[params->offset + 3] = std::byte{1};
+  test::reseal(file);
+  const auto kept = std::make_shared<std::vector<std::byte>>(file);
+  const auto container = Container::open(*kept, "file", kept);
+  ASSERT_TRUE(container) << container.error().what;
+  const auto volume = svmm::PackedVolume::open(*container, f.memory);
+  ASSERT_TRUE(volume) << volume.error().what;
+  const auto grid = MaskGrid::open(*volume, f.ctx);
+  ASSERT_TRUE(grid);
+  Frame frame;
+  CastOptions options;
+  options.width = options.height = 16;
+  const Status status = cast(*grid, Camera::orbit(0, 0, 1.5, 45), options, frame, f.ctx);
+  ASSERT_FALSE(status);
+  EXPECT_EQ(status.error().code, ErrorCode::input);
+  EXPECT_NE(status.error().what.find("byte 3"), std::string::npos);
 }
 
 TEST(MaskGrid, WhatIsTranslucentDoesNotFit) {
