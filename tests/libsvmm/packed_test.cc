@@ -5,66 +5,16 @@
 
 #include <cmath>
 #include <limits>
-#include <map>
 
-#include "formats/volume/open_volume.h"
 #include "libsvmm/packed/packed_layout.h"
 #include "tests/damage.h"
 #include "tests/libsvmm/packed_attack.h"
-#include "tests/libsvmm/volumes.h"
+#include "tests/libsvmm/packed_files.h"
 
 namespace voxkit::svmm {
 namespace {
 
 using namespace voxkit::svmm::test;
-using voxkit::test::Bytes;
-
-MemoryBudget& memory() {
-  static MemoryBudget budget(uint64_t{1} << 30);
-  return budget;
-}
-Context context(int threads = 2) {
-  Context ctx;
-  ctx.threads = threads;
-  ctx.memory = &memory();
-  return ctx;
-}
-
-struct Written {
-  Bytes bytes;
-  PackedParams params;
-};
-Written encode(VolumeSource& source, const PackedOptions& options, int threads = 2) {
-  Context ctx = context(threads);
-  Written out;
-  const auto params = encode_packed(
-      source, options,
-      [&](std::span<const std::byte> bytes) -> Status {
-        out.bytes.insert(out.bytes.end(), bytes.begin(), bytes.end());
-        return {};
-      },
-      ctx);
-  EXPECT_TRUE(params) << params.error().what;
-  if (params) out.params = *params;
-  return out;
-}
-std::shared_ptr<const PackedVolume> open(const Bytes& file) {
-  const auto bytes = std::make_shared<const Bytes>(file);
-  auto container = Container::open(*bytes, "packed", bytes);
-  EXPECT_TRUE(container) << container.error().what;
-  auto volume = PackedVolume::open(*container, memory());
-  EXPECT_TRUE(volume) << volume.error().what;
-  return volume ? *volume : nullptr;
-}
-Bytes decode(const PackedVolume& volume, int level, const Box& box) {
-  Bytes voxels(static_cast<size_t>(box.voxels() * voxel_bytes(volume.info().format)));
-  const Status status = volume.decode(box, level, packed(voxels.data(), box.size(), volume.info().format));
-  EXPECT_TRUE(status) << status.error().what;
-  return voxels;
-}
-Bytes decode(const PackedVolume& volume, int level = 0) {
-  return decode(volume, level, {{0, 0, 0}, volume.levels()[static_cast<size_t>(level)].dims});
-}
 
 const VoxelFormat scalars[] = {VoxelFormat::density8, VoxelFormat::density16, VoxelFormat::float32,
                                VoxelFormat::bitmap};
@@ -103,16 +53,6 @@ double mean_at(const std::vector<double>& values, Index3 dims, Index3 at, bool f
   }
   return floats ? static_cast<double>(static_cast<float>(sum / count)) : std::floor(sum / count + 0.5);
 }
-std::vector<double> numbers(const Bytes& voxels, VoxelFormat format) {
-  std::vector<double> out;
-  for (size_t i = 0; i < voxels.size(); i += static_cast<size_t>(voxel_bytes(format))) {
-    Voxel v;
-    std::memcpy(v.bytes.data(), &voxels[i], static_cast<size_t>(voxel_bytes(format)));
-    out.push_back(format == VoxelFormat::float32 ? static_cast<double>(v.as<float>()) : v.as<uint32_t>());
-  }
-  return out;
-}
-
 TEST(Packed, LevelsAreMeans) {
   for (const VoxelFormat format : {VoxelFormat::density8, VoxelFormat::density16, VoxelFormat::float32}) {
     const VolumeInfo info = make_info({37, 18, 51}, format);
