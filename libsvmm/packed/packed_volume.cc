@@ -1,7 +1,7 @@
 #include <fmt/format.h>
 
+#include <algorithm>
 #include <array>
-#include <atomic>
 #include <cmath>
 #include <cstring>
 
@@ -9,7 +9,7 @@
 #include "formats/volume_chunks.h"
 #include "libpage/page.h"
 #include "libsvmm/packed/packed_layout.h"
-#include "libsvmm/packed/page_cache.h"
+#include "libsvmm/packed/pages.h"
 
 namespace voxkit::svmm {
 namespace {
@@ -19,40 +19,6 @@ constexpr size_t most_jobs = 8;
 
 }  // namespace
 
-struct PackedVolume::Pages {
-  struct Level {
-    PageGrid grid;
-    std::vector<size_t> chunks;  ///< by part: index into the container's table
-    /// Parts whose lengths were found to be right.
-    std::unique_ptr<std::atomic<bool>[]> checked;
-    std::optional<page::Model> model;  ///< none: not yet known
-  };
-  explicit Pages(MemoryBudget& memory) : cache(memory) {}
-
-  std::vector<Level> levels;
-  mutable PageCache cache;  ///< of codes
-  mutable std::atomic<uint64_t> decoded{0};
-
-  /// The pages of a part; ErrorCode::input where it is damaged.
-  Result<PartView> part(const Container& container, int level, uint64_t number) const {
-    const Level& l = levels[static_cast<size_t>(level)];
-    VOX_TRY(const auto bytes, container.chunk(l.chunks[number]));
-    const PartView view(bytes, l.grid.pages_of(number));
-    if (!l.checked[number].load(std::memory_order_acquire)) {
-      if (!view.valid())
-        return bad_input(container.name(),
-                         fmt::format("chunk PAGE {}.{}: lengths of pages that do not add up", level, number));
-      l.checked[number].store(true, std::memory_order_release);
-    }
-    return view;
-  }
-  Result<std::span<const std::byte>> page(const Container& container, int level, uint64_t number) const {
-    const uint64_t a_part = levels[static_cast<size_t>(level)].grid.pages_a_part();
-    VOX_TRY(const PartView view, part(container, level, number / a_part));
-    return view.page(number % a_part);
-  }
-};
-
 namespace {
 
 Error at_page(const Container& container, int level, uint64_t number, const PageGrid& grid,
@@ -60,28 +26,6 @@ Error at_page(const Container& container, int level, uint64_t number, const Page
   const Index3 lo = grid.box(number).lo;
   return {ErrorCode::input, container.name(),
           fmt::format("level {}, page at {},{},{}: {}", level, lo.x, lo.y, lo.z, error.what)};
-}
-
-/// Puts the codes of a page where its voxels go, as far as they are in `box`; `out` is at the box's corner.
-template <class T>
-void place(const T* codes, const Box& page, const Box& box, const ValueMap& map, VoxelFormat format,
-           VoxelSpan out) {
-  const Box part = intersect(page, box);
-  const Index3 size = page.size();
-  for (int64_t z = part.lo.z; z < part.hi.z; ++z)
-    for (int64_t y = part.lo.y; y < part.hi.y; ++y) {
-      const T* const from =
-          codes + ((z - page.lo.z) * size.y + (y - page.lo.y)) * size.x + (part.lo.x - page.lo.x);
-      std::byte* const to =
-          out.row(y - box.lo.y, z - box.lo.z) + (part.lo.x - box.lo.x) * voxel_bytes(format);
-      const auto count = static_cast<size_t>(part.hi.x - part.lo.x);
-      if constexpr (sizeof(T) < 4) {
-        std::memcpy(to, from, count * sizeof(T));
-      } else {
-        auto* const floats = reinterpret_cast<float*>(to);
-        for (size_t x = 0; x < count; ++x) floats[x] = map.value(from[x]);
-      }
-    }
 }
 
 }  // namespace
@@ -108,10 +52,11 @@ Result<std::shared_ptr<const PackedVolume>> PackedVolume::open(std::shared_ptr<c
   for (int i = 0; i < levels; ++i) {
     Pages::Level level;
     level.grid = PageGrid(level_dims(volume->info_.dims, i), volume->params_.page_side);
-    if (level.grid.parts() > table.size())
-      return bad(fmt::format("fewer chunks PAGE than the {} of level {}", level.grid.parts(), i));
-    level.chunks.assign(level.grid.parts(), none);
-    level.checked = std::make_unique<std::atomic<bool>[]>(level.grid.parts());
+    // A level with fewer is not there, and takes no memory.
+    if (level.grid.parts() <= table.size()) {
+      level.chunks.assign(level.grid.parts(), none);
+      level.checked = std::make_unique<std::atomic<bool>[]>(level.grid.parts());
+    }
     volume->levels_.push_back({level.grid.dims, level.grid.count, 0, 0, 0});
     pages.levels.push_back(std::move(level));
   }
@@ -131,15 +76,26 @@ Result<std::shared_ptr<const PackedVolume>> PackedVolume::open(std::shared_ptr<c
     *slot = i;
     PackedLevel& level = volume->levels_[entry.index];
     (entry.kind == pages_kind ? level.page_bytes : level.model_bytes) += entry.length;
-    level.end = std::max(level.end, entry.offset + entry.stored);
+    level.end = i + 1 < table.size() ? table[i + 1].offset : container->file_bytes();
   }
-  for (size_t i = 0; i < pages.levels.size(); ++i)
-    for (size_t part = 0; part < pages.levels[i].chunks.size(); ++part)
-      if (pages.levels[i].chunks[part] == none) return bad(fmt::format("no chunk PAGE {}.{}", i, part));
+  // Of a file that was cut the finest levels have no pages at all.
+  const auto absent = [&](const Pages::Level& level) {
+    return std::ranges::all_of(level.chunks, [&](size_t chunk) { return chunk == none; });
+  };
+  while (volume->finest_ + 1 < levels && absent(pages.levels[static_cast<size_t>(volume->finest_)]))
+    ++volume->finest_;
+  const auto finest = static_cast<size_t>(volume->finest_);
+  for (size_t i = finest; i < pages.levels.size(); ++i) {
+    const Pages::Level& level = pages.levels[i];
+    if (level.chunks.size() < level.grid.parts())
+      return bad(fmt::format("fewer chunks PAGE than the {} of level {}", level.grid.parts(), i));
+    for (size_t part = 0; part < level.chunks.size(); ++part)
+      if (level.chunks[part] == none) return bad(fmt::format("no chunk PAGE {}.{}", i, part));
+  }
   for (size_t i = 0; i < pages.levels.size(); ++i) {
     if (models[i] == none) {
-      if (i == 0) return bad("no chunk MODL 0.0");
-      pages.levels[i].model = pages.levels[i - 1].model;
+      if (i > 0) pages.levels[i].model = pages.levels[i - 1].model;
+      if (i >= finest && !pages.levels[i].model) return bad(fmt::format("no chunk MODL {}.0", finest));
       continue;
     }
     VOX_TRY(const auto model_bytes, container->chunk(models[i]));
@@ -329,7 +285,7 @@ std::optional<Voxel> PackedVolume::uniform(const Box& box, int level) const {
 
 Status PackedVolume::check(Context& ctx) const {
   for (size_t i = 0; i < container_->table().size(); ++i) VOX_CHECK(container_->chunk(i));
-  for (size_t level = 0; level < pages_->levels.size(); ++level) {
+  for (auto level = static_cast<size_t>(finest_); level < pages_->levels.size(); ++level) {
     const PageGrid& grid = pages_->levels[level].grid;
     constexpr int64_t run = 32;  // pages
     const Index3 runs((grid.count.x + run - 1) / run, grid.count.y, grid.count.z);
@@ -373,6 +329,10 @@ Result<std::unique_ptr<VolumeSource>> open_source(std::shared_ptr<const PackedVo
   const int levels = volume->params().levels;
   if (level < 0 || level >= levels)
     return bad_usage(fmt::format("--level {}: the file has levels 0 to {}", level, levels - 1));
+  if (level < volume->finest())
+    return bad_input(volume->container().name(),
+                     fmt::format("level {} is not there, the file was cut: expected --level {}, or up to {}",
+                                 level, volume->finest(), levels - 1));
   return std::make_unique<PackedSource>(std::move(volume), level);
 }
 

@@ -57,7 +57,8 @@ class Packed:
         self.models = []  # of each level
         for level in range(self.count):
             own = (b"MODL", level, 0) in container.chunks
-            self.models.append(self.read_model(level) if own else self.models[-1])
+            self.models.append(self.read_model(level) if own else self.models[-1] if self.models else None)
+        require(self.models[self.finest] is not None, "chunk table: chunk MODL {} is missing", self.finest)
         require(not self.models[-1].parents, "chunks MODL: the model of level {} has parents", self.count - 1)
         self.known = {}  # levels that were decoded, as codes
 
@@ -73,9 +74,11 @@ class Packed:
 
     def check_chunks(self):
         unused = {key for key in self.container.chunks if key[0] in (b"MODL", b"PAGE")}
-        require((b"MODL", 0, 0) in unused, "chunk table: chunk MODL 0 is missing")
         unused -= {(b"MODL", level, 0) for level in range(self.count)}
-        for level in range(self.count):
+        # A file that was cut has no pages of the finest levels.
+        there = {level for kind, level, _ in unused if kind == b"PAGE" and level < self.count}
+        self.finest = min(there, default=self.count - 1)
+        for level in range(self.finest, self.count):
             parts = divide_up(math.prod(self.pages(level)), self.part_pages())
             require(parts <= len(unused), "chunk table: level {}: parts of chunk PAGE are missing", level)
             for part in range(parts):
@@ -115,6 +118,7 @@ class Packed:
 
     def codes_of(self, level):
         """Of each page of a level: its corner, its shape and its codes."""
+        require(level >= self.finest, "level {}: its chunks PAGE are missing: the file was cut", level)
         if level in self.known:
             return self.known[level]
         dims, grid, side, model = self.dims(level), self.pages(level), self.side, self.models[level]
@@ -175,8 +179,8 @@ def describe(packed):
         "slope": volume.slope, "intercept": volume.intercept, "range": volume.range if volume.has_range else None,
         "raw_bytes": math.prod(volume.dims) * volume.voxel_bytes, "file_bytes": len(packed.container.data),
         "params": {"layout": "packed", "page_side": packed.side, "codes": CODES[packed.codes], "max_error": packed.max_error},
-        "palettes": [len(m.palette) if m.has_palette else None for m in packed.models],
-        "levels": [{"index": k, "dims": packed.dims(k), "pages": packed.pages(k)} for k in range(packed.count)],
+        "palettes": [len(m.palette) if m.has_palette else None for m in packed.models[packed.finest:]],
+        "levels": [{"index": k, "dims": packed.dims(k), "pages": packed.pages(k)} for k in range(packed.finest, packed.count)],
     }
 
 
