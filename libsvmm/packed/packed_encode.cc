@@ -235,7 +235,7 @@ class Encoder {
   Result<Written> write(double max_error, const ByteSink& sink) {
     decoded_.reset();
     squared_error_ = 0;
-    set_bound(max_error);
+    VOX_CHECK(set_bound(max_error));
     if (params_.map.kind == CodeKind::steps) VOX_CHECK(choose_map());
     ContainerWriter container(sink, Codec::svmm, container_version_for(info_), 0, *ctx_.memory);
     VOX_CHECK(add_volume_info(container, info_));
@@ -259,19 +259,11 @@ class Encoder {
   /// About what would come of a bound; with `only_error` no bytes.
   Result<Written> sample(double max_error, bool only_error) {
     decoded_.reset();
-    set_bound(max_error);
+    VOX_CHECK(set_bound(max_error));
     Written all;
     if (only_error && max_error == 0) return all;
     if (only_error && info_.format == VoxelFormat::float32) {
-      // Codes of floats are kept as they are: nothing but steps changes a voxel.
-      double voxels = 0;
-      VOX_CHECK(sample_pages(0, most_samples,
-                             [&](const PageReader& reader, uint64_t, auto codes, page::Extent) -> Status {
-                               all.squared_error += reader.squared_error();
-                               voxels += static_cast<double>(codes.size());
-                               return {};
-                             }));
-      all.squared_error *= static_cast<double>(*checked_voxels(info_.dims)) / voxels;
+      VOX_TRY(all.squared_error, error_of_steps());
       return all;
     }
     for (int level = 0; level < std::min(params_.levels, only_error ? 1 : 2); ++level) {
@@ -310,16 +302,40 @@ class Encoder {
   }
 
   /// What follows from a bound and the values that there are.
-  void set_bound(double max_error) {
+  Status set_bound(double max_error) {
     params_.max_error = max_error;
     if (info_.format == VoxelFormat::float32) {
       params_.map = ValueMap::for_floats(survey_.range(), max_error);
       if (params_.map.kind == CodeKind::ordered) params_.max_error = 0;
-      return;
+      return params_.map.kind == CodeKind::steps ? place_steps() : Status();
     }
     params_.max_error = std::floor(max_error);
     const bool exact = params_.max_error == 0 && !info_.is_labels && !info_.fill;
     raster_ = exact ? Raster(survey_.values()) : Raster();
+    return {};
+  }
+
+  /// Steps from the least value or through 0: volumes are full of one of these, as a rule, or of values
+  /// around it, and have much smaller errors where it is a step itself.
+  Status place_steps() {
+    const ValueMap from_least = params_.map;
+    VOX_TRY(const double error_from_least, error_of_steps());
+    params_.map = from_least.through_zero();
+    VOX_TRY(const double error_through_zero, error_of_steps());
+    if (!(error_through_zero < error_from_least)) params_.map = from_least;
+    return {};
+  }
+
+  /// About what is lost of floats, whose codes are kept as they are: nothing but steps changes a voxel.
+  Result<double> error_of_steps() {
+    double error = 0, voxels = 0;
+    VOX_CHECK(sample_pages(0, most_samples,
+                           [&](const PageReader& reader, uint64_t, auto codes, page::Extent) -> Status {
+                             error += reader.squared_error();
+                             voxels += static_cast<double>(codes.size());
+                             return {};
+                           }));
+    return error * static_cast<double>(*checked_voxels(info_.dims)) / voxels;
   }
 
   /// Of floats: steps within the bound, or, where these take more bytes, all bits.

@@ -54,6 +54,10 @@ ValueMap ValueMap::for_floats(ValueRange range, double max_error) {
   return {CodeKind::steps, range.lo, step};
 }
 
+ValueMap ValueMap::through_zero() const {
+  return lo < 0 ? ValueMap{kind, -std::ceil(-lo / step) * step, step} : *this;
+}
+
 double ValueMap::least_error(ValueRange range) {
   const double rounding = rounding_of(range);
   return std::max(2.01 * rounding, rounding + std::ldexp(range.hi - range.lo, -31));
