@@ -112,7 +112,7 @@ double BoundSearch::best() const {
   if (!whole_) return psnr && real < least_ ? 0 : std::clamp(real, least_, most_);
   const double bound = std::clamp(psnr ? std::floor(real) : std::ceil(real), 0.0, most_),
                other = bound + (psnr ? 1 : -1);
-  const auto close = [&](double b) { return std::abs(excess_at(at(b))) <= tolerance_; };
+  const auto close = [&](double b) { return std::abs(excess_at(at(b))) <= 0.75 * tolerance_; };
   return !close(bound) && other >= 0 && other <= most_ && close(other) ? other : bound;
 }
 
