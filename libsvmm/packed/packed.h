@@ -22,7 +22,7 @@ namespace voxkit::svmm {
 struct PackedTarget {
   enum class Kind {
     psnr,  ///< decibels of level 0, as voxdiff counts them: within 0.2 of the target
-    bits   ///< of the whole file, for each voxel of level 0: within 2 %
+    bits   ///< of the whole file, for each voxel of level 0: within 2 %, of floats mostly
   };
   Kind kind = Kind::psnr;
   double value = 0;  ///< above 0, at most 1000
