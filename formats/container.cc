@@ -86,7 +86,7 @@ Status ContainerWriter::add(uint32_t kind, uint32_t index, uint64_t part, std::s
   return pad();
 }
 
-Status ContainerWriter::finish() {
+Status ContainerWriter::checkpoint() {
   if (position_ == 0) VOX_CHECK(begin());
   std::vector<std::byte> table(table_.size() * entry_size);
   for (size_t i = 0; i < table_.size(); ++i) {

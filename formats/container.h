@@ -56,8 +56,11 @@ class ContainerWriter {
   ContainerWriter(ByteSink sink, Codec codec, uint16_t version, int zstd, MemoryBudget& memory);
   /// Appends a chunk. Errors: those of the sink; ErrorCode::limit if there is no memory to compress it.
   Status add(uint32_t kind, uint32_t index, uint64_t part, std::span<const std::byte> bytes);
+  /// Writes a table and a trailer as `finish` does, and more may follow: the file up to here is a container
+  /// of the chunks so far. Readers of the whole file take no notice. Errors: those of the sink.
+  Status checkpoint();
   /// Writes the table and the trailer. Nothing may follow. Errors: those of the sink.
-  Status finish();
+  Status finish() { return checkpoint(); }
   uint64_t bytes_written() const { return position_; }
 
  private:
@@ -94,6 +97,10 @@ class Container {
   /// checksum or cannot be expanded to their length, ErrorCode::limit if there is no memory for that. Some
   /// bytes behind them may be read. Thread-safe.
   Result<std::span<const std::byte>> chunk(size_t i) const;
+  /// The bytes that the i-th chunk takes in the file, be they damaged or not.
+  std::span<const std::byte> unchecked(size_t i) const {
+    return bytes_.subspan(table_[i].offset, table_[i].stored);
+  }
   bool has_chunk(uint32_t kind) const;
   /// The bytes of the only chunk of this kind; ErrorCode::input if there is none, or more than one.
   Result<std::span<const std::byte>> only_chunk(uint32_t kind) const;

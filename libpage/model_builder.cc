@@ -13,8 +13,6 @@ namespace {
 
 using Counts = std::array<uint64_t, symbol_count>;
 
-/// Of fitting to what the fit before led to.
-constexpr int most_rounds = 6;
 /// With void voxels: what these become settles slowly.
 constexpr int most_masked_rounds = 12;
 
@@ -102,7 +100,7 @@ uint64_t cost(const std::vector<Counts>& counts) {
 
 /// Weights and tables. What is predicted from is what the decoder has, which depends on the weights where
 /// there is a bound or void: they are fitted again to what those before led to, and the best are kept.
-void fit(ModelData& model, std::vector<Sampled>& pages) {
+void fit(ModelData& model, std::vector<Sampled>& pages, int most_rounds) {
   model.background = common_value(model, pages);
   std::erase_if(pages, [&](const Sampled& page) { return is_constant(model, page); });
   const double e = model.max_error;
@@ -217,7 +215,7 @@ Result<Model> ModelBuilder::build(const ModelOptions& options) const {
       if (!number(palette, pages.back().values))
         return bad_usage("page model: a sample that is none of the values");
     }
-    fit(*made, pages);
+    fit(*made, pages, options.rounds);
     return Model(std::move(made));
   };
   VOX_TRY(Model plain, fitted({}));

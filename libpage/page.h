@@ -61,6 +61,8 @@ struct ModelOptions {
   std::vector<uint32_t> values;
   /// Whether pages have parents.
   bool parents = false;
+  /// Of fitting with a bound, 1 or more: each takes as long; fewer make larger pages.
+  int rounds = 6;
 };
 
 /// Fits a model to sample pages, or to all of them. Its result depends on these and their order alone: all

@@ -24,7 +24,7 @@ struct Options {
   int64_t rootwidth = 32;
   std::optional<double> quality, delta;
   std::string base = "raw", layout = "plain", bound, alpha_weight, levels = "on", page = "16";
-  std::optional<double> max_error;
+  std::optional<double> max_error, target_psnr, target_bpv;
   std::optional<ValueRange> range;
   int zstd = 0;
   bool verify = false;
@@ -56,6 +56,14 @@ void declare(CommandLine& line, Options& o) {
   line.option("--max-error", "E",
               "Of layout packed, in place of a quality: greatest error, in units of samples",
               number(o.max_error, 0, 1e300));
+  line.option("--target-psnr", "DB",
+              "Of layout packed, in place of a quality: finds the greatest error that leads to so many dB",
+              number(o.target_psnr, 1, 1000));
+  line.option(
+      "--target-bpv", "B",
+      "Of layout packed, in place of a quality: finds the greatest error that leads to so many bits a "
+      "voxel, of the whole file",
+      number(o.target_bpv, 0.001, 1000));
   line.option("--levels", "on|off", "Of layout packed: coarser levels, for views from afar (on)",
               one_of(o.levels, {"on", "off"}));
   line.option("--page", "N",
@@ -134,6 +142,13 @@ Result<bool> holds(std::unique_ptr<VolumeSource>& source, Inputs& inputs, const 
   return false;
 }
 
+std::optional<svmm::PackedTarget> target_of(const Options& o) {
+  using Kind = svmm::PackedTarget::Kind;
+  if (o.target_psnr) return svmm::PackedTarget{Kind::psnr, *o.target_psnr};
+  if (o.target_bpv) return svmm::PackedTarget{Kind::bits, *o.target_bpv};
+  return std::nullopt;
+}
+
 /// Full scale: what --range says, or else, unless nothing depends on it, what is measured. A value of floats
 /// that stands for nothing is looked for on the way.
 Result<double> scale_of(const Options& o, bool lossless, std::unique_ptr<VolumeSource>& source,
@@ -144,7 +159,7 @@ Result<double> scale_of(const Options& o, bool lossless, std::unique_ptr<VolumeS
   if (!lossless && format == VoxelFormat::float32) {
     VOX_TRY(const Census census, look_at_floats(source, inputs, o.input, run));
     range = census.range;
-  } else if (!lossless && !o.max_error && format == VoxelFormat::density16) {
+  } else if (!lossless && !o.max_error && !target_of(o) && format == VoxelFormat::density16) {
     run.stage("measure");
     VOX_TRY(range, measure_range(*source, run.ctx));
     if (source->forward_only()) {
@@ -159,8 +174,10 @@ Status check_packed(const Options& o) {
       !o.alpha_weight.empty() || o.zstd != 0)
     return bad_usage(
         "--blockwidth, --rootwidth, --base, --bound, --alpha-weight, --zstd: not of --layout packed");
-  if ((o.quality.has_value() + o.delta.has_value() + o.max_error.has_value()) > 1)
-    return bad_usage("--quality, --delta and --max-error: expected one of them");
+  if (o.quality.has_value() + o.delta.has_value() + o.max_error.has_value() + o.target_psnr.has_value() +
+          o.target_bpv.has_value() >
+      1)
+    return bad_usage("--quality, --delta, --max-error, --target-psnr and --target-bpv: expected one of them");
   return {};
 }
 
@@ -173,9 +190,10 @@ Result<int> work_packed(const Options& o, Inputs& inputs, Run& run) {
   options.levels = o.levels == "on";
   const double delta =
       o.delta ? *o.delta : svmm::delta_of_quality(o.quality.value_or(90), format, svmm::Layout::plain);
-  const bool lossless = o.max_error ? *o.max_error == 0 : delta == 0;
+  options.target = target_of(o);
+  const bool lossless = o.max_error ? *o.max_error == 0 : delta == 0 && !options.target;
   VOX_TRY(const double scale, scale_of(o, lossless, source, inputs, run));
-  options.max_error = o.max_error.value_or(delta * scale);
+  if (!options.target) options.max_error = o.max_error.value_or(delta * scale);
   const VolumeInfo info = source->info();
   run.stage("read");
   VOX_TRY(source, spooled(std::move(source), run.ctx));
@@ -213,8 +231,8 @@ Result<int> work(const Options& o, Run& run) {
   open.outputs = {o.output};
   Inputs inputs(o.input, open, run.ctx);
   if (o.layout == "packed") return work_packed(o, inputs, run);
-  if (o.max_error || o.levels != "on" || o.page != "16")
-    return bad_usage("--max-error, --levels, --page: of --layout packed only");
+  if (o.max_error || target_of(o) || o.levels != "on" || o.page != "16")
+    return bad_usage("--max-error, --target-psnr, --target-bpv, --levels, --page: of --layout packed only");
   const bool lossless = o.delta ? *o.delta == 0 : o.quality.value_or(90) == 100;
   VOX_TRY(auto source, inputs.open(o.verify || (!lossless && !o.range)));
   VOX_TRY(svmm::Params params, params_of(o, source->info().format));
@@ -258,6 +276,7 @@ int main(int argc, char** argv) {
       argc, argv, "svmm-encode", "Compresses a volume as sparse voxel mip-maps.",
       "  svmm-encode head.nii.gz -o head.svmm\n"
       "  svmm-encode head.nii.gz -o head.svmm --quality 100 --verify\n"
+      "  svmm-encode head.nii.gz -o head.svmm --layout packed --target-psnr 45\n"
       "  svmm-encode menger:6 -o menger.svmm --blockwidth 4 --base bitmap --quality 80\n"
       "  svmm-encode scan.raw --dims 512,512,361 --type u16 -o - --quality 95 > scan.svmm\n",
       [&](CommandLine& line) { declare(line, options); }, [&](Run& run) { return work(options, run); });

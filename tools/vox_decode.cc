@@ -1,11 +1,14 @@
 // vox-decode: a compressed volume, whole, in part, or at a coarser level, as a plain volume.
 #include <fmt/core.h>
 
+#include <algorithm>
+
 #include "formats/convert.h"
 #include "formats/copy.h"
 #include "formats/fill.h"
 #include "formats/volume/open_volume.h"
 #include "formats/volume/readers.h"
+#include "libsvmm/packed/salvage.h"
 #include "tools/common/input.h"
 #include "tools/common/json.h"
 #include "tools/common/main.h"
@@ -22,7 +25,7 @@ struct Options {
   int level = 0;
   std::optional<TargetType> type;
   std::optional<ValueRange> range;
-  bool tiles = false;
+  bool tiles = false, salvage = false;
 };
 
 void declare(CommandLine& line, Options& o) {
@@ -40,6 +43,11 @@ void declare(CommandLine& line, Options& o) {
             "Of a .dagc file: the images of its colours, one for each 2^20; OUT is a pattern such as "
             "tile-%04d.png (or .jpg .jp2; .dds of bc1 and bc7; .astc of astc)",
             o.tiles);
+  line.flag(
+      "--salvage",
+      "Of a damaged .svmm file of layout packed: decode the pages that are sound, others are void (0, or "
+      "the fill value), and exit 1",
+      o.salvage);
   declare_range_option(line, o.range,
                        "Values that a narrower type's ends stand for (default: least and greatest value)");
 }
@@ -68,8 +76,8 @@ Result<int> write_voxels(const Options& o, const color::Volume& volume, Run& run
 }
 
 Result<int> write_images(const Options& o, Run& run) {
-  if (o.roi || o.type || o.level != 0)
-    return bad_usage("--roi, --type, --level: not of --tiles: leave them out");
+  if (o.roi || o.type || o.level != 0 || o.salvage)
+    return bad_usage("--roi, --type, --level, --salvage: not of --tiles: leave them out");
   VOX_TRY(const Input input, open_compressed(o.input, 0, run.ctx));
   if (!input.color) return fail(ErrorCode::usage, o.input, "--tiles: expected a .dagc file");
   const double start = run.seconds();
@@ -99,6 +107,26 @@ void warn_of_size(const Options& o, const Input& input, const VolumeInfo& info, 
                   o.output, input.color->params().leaf_voxels, static_cast<double>(bytes) / 1e9));
 }
 
+/// What a damaged file has lost: a line, with --verbose one for each page.
+void report_losses(const Options& o, const std::vector<svmm::Losses::Page>& pages, size_t lost, Run& run) {
+  constexpr size_t most_named = 4;
+  const auto place = [](const svmm::Losses::Page& page) {
+    return fmt::format("level {} at {},{},{}", page.level, page.at.x, page.at.y, page.at.z);
+  };
+  std::string named;
+  size_t left = lost;
+  for (const svmm::Losses::Page& page : pages) {
+    run.note(fmt::format("{}: {}: {}", o.input, place(page), page.doubtful ? "doubtful" : "lost"));
+    if (page.doubtful || lost - left == most_named) continue;
+    named += (named.empty() ? ": " : "; ") + place(page);
+    --left;
+  }
+  if (left > 0) named += fmt::format("; and {} more", left);
+  report(run.tool, {ErrorCode::input, o.input,
+                    fmt::format("damaged: {} doubtful pages were kept, {} are lost{}", pages.size() - lost,
+                                lost, named)});
+}
+
 Result<int> work(const Options& o, Run& run) {
   if (run.options.json && o.output == "-")
     return bad_usage("--json and the output - both use standard output");
@@ -112,6 +140,12 @@ Result<int> work(const Options& o, Run& run) {
   VOX_TRY(Input input, open_compressed(o.input, o.level, run.ctx));
   if (only_surface && !input.color)
     return fail(ErrorCode::usage, o.input, "points and models are made of surfaces: expected a .dagc file");
+  const auto losses = std::make_shared<svmm::Losses>();
+  if (o.salvage) {
+    if (!input.packed)
+      return fail(ErrorCode::usage, o.input, "--salvage: expected a .svmm file of layout packed");
+    VOX_TRY(input.source, svmm::open_salvaged(input.packed, o.level, losses));
+  }
   if (input.color && is_surface_output(o.output) && !o.roi && !o.type)
     return write_voxels(o, *input.color, run);
   // Boxes are found by counts, of which each box follows but a few.
@@ -147,15 +181,20 @@ Result<int> work(const Options& o, Run& run) {
 
   run.note(fmt::format("{}: {} x {} x {} voxels of {} in {:.2f} s", o.output, info.dims.x, info.dims.y,
                        info.dims.z, type_name(info), seconds));
+  const std::vector<svmm::Losses::Page> pages = losses->pages();
+  const auto lost = static_cast<size_t>(std::ranges::count(pages, false, &svmm::Losses::Page::doubtful));
   if (run.options.json) {
     Json json = Json::result();
     json.set("tool", run.tool).set("version", version_text()).set("input", o.input).set("output", o.output);
     json.set("level", o.level).set("dims", info.dims).set("voxel_format", name(info.format));
     json.set("raw_bytes", raw_bytes(info)).set("decode_seconds", seconds);
+    if (o.salvage) json.set("lost_pages", lost).set("doubtful_pages", pages.size() - lost);
     json.set("peak_rss_bytes", peak_rss_bytes()).set("threads", run.options.threads);
     VOX_CHECK(print(json.text()));
   }
-  return 0;
+  if (pages.empty()) return 0;
+  report_losses(o, pages, lost, run);
+  return 1;
 }
 
 }  // namespace
@@ -169,6 +208,7 @@ int main(int argc, char** argv) {
       "  vox-decode head.svmm -o head.nrrd\n"
       "  vox-decode head.vqv -o part.nii.gz --roi 0,0,0,64,64,64\n"
       "  vox-decode head.svmm -o small.nrrd --level 2\n"
+      "  vox-decode damaged.svmm -o rest.nrrd --salvage\n"
       "  vox-decode house.dagc -o house.ply\n"
       "  vox-decode house.dagc -o tile-%04d.png --tiles\n"
       "  vox-decode house.dagc -o house.vox\n"

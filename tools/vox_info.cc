@@ -115,7 +115,7 @@ Json json_of(const Options& o, const Run& run, const Input& input, std::optional
   if (input.svmm) {
     json.set("levels", levels_json(input.svmm->levels()));
   }
-  if (input.packed) json.set("levels", levels_json(input.packed->levels()));
+  if (input.packed) json.set("levels", levels_json(*input.packed));
   if (input.vq) add_sizes(input.vq->params(), json);
   if (input.color) add_sizes(input.color->params(), json);
   if (o.check) json.set("checked", true);

@@ -134,8 +134,9 @@ class ColorEncoder {
           VOX_CHECK(container_.add(model_kind, index, c, model->models[c].serialise()));
       }
       VOX_CHECK(encode(level, *model));
+      // What is there by now is a file of the coarser levels.
+      VOX_CHECK(level == 0 ? container_.finish() : container_.checkpoint());
     }
-    VOX_CHECK(container_.finish());
     return params_;
   }
 

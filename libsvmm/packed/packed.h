@@ -23,12 +23,27 @@ namespace voxkit::svmm {
 struct PackedPages;
 struct Ancestors;
 
+/// What a file is to have, in place of a bound: the encoder finds one that leads to it.
+struct PackedTarget {
+  enum class Kind {
+    psnr,  ///< decibels of level 0, as voxdiff counts them: within 0.2 of the target
+    bits   ///< of the whole file, for each voxel of level 0: within 2 %, of floats mostly
+  };
+  Kind kind = Kind::psnr;
+  double value = 0;  ///< above 0, at most 1000
+};
+
 struct PackedOptions {
   /// No decoded voxel of level 0 is further from its original than this, nor one of another level from the
   /// mean it stands for; in units of samples. 0: all are equal. Only means of 8 bits may be off by 2 in any
   /// case, and where all integers that there are lie further apart than this bound, means by half of that
   /// distance, or a 43rd of the range.
   double max_error = 0;
+  /// With it `max_error` is 0, and is found: for floats any number, for integers a whole one. Where no whole
+  /// bound leads near enough, the largest one with at least the decibels, which may be 0; or the smallest one
+  /// with no more than the bits, or, if all have more, the one with the fewest. Samples of the pages tell
+  /// which; then the whole volume is encoded, and, where that is off, once more.
+  std::optional<PackedTarget> target = std::nullopt;
   bool levels = true;  ///< whether there are levels above 0
   int page_side = 16;  ///< 16 or 8 voxels
 };
@@ -64,7 +79,9 @@ struct PackedLevel {
   Index3 pages{0};          ///< along each axis
   uint64_t page_bytes = 0;  ///< of all pages with their index
   uint64_t model_bytes = 0;
-  uint64_t end = 0;  ///< offset in the file behind the last of its chunks
+  /// Where what follows its last chunk begins: of a file of ours, so many bytes from its begin are a file of
+  /// this level and the coarser ones.
+  uint64_t end = 0;
 };
 
 /// Compresses `source`, scalars of any format, into a container written to `sink`. Two passes over a source
@@ -80,7 +97,9 @@ Result<PackedParams> encode_packed(VolumeSource& source, const PackedOptions& op
 /// Whether a container of Codec::svmm is of this layout.
 bool is_packed(const Container& container);
 
-/// A file of this layout, opened for random access. Safe on any bytes. All const functions are thread-safe.
+/// A file of this layout, opened for random access. Safe on any bytes. All const functions are thread-safe. A
+/// file that was cut where a level ends has that level and the coarser ones; of the finer ones it has nothing
+/// but their extents in `levels()`, and nobody may ask for their voxels.
 class PackedVolume {
  public:
   /// `memory`, which must outlive it, counts decoded pages that are kept. Errors: ErrorCode::input.
@@ -90,6 +109,8 @@ class PackedVolume {
   const VolumeInfo& info() const { return info_; }
   const PackedParams& params() const { return params_; }
   const std::vector<PackedLevel>& levels() const { return levels_; }
+  /// The finest level that is there: 0, unless the file was cut.
+  int finest() const { return finest_; }
   const Container& container() const { return *container_; }
 
   /// Decodes `box`, in voxels of `level` and inside its dims: only the pages that it touches, and of coarser
@@ -120,6 +141,9 @@ class PackedVolume {
   /// Pages that were decoded so far, of all levels.
   uint64_t pages_decoded() const;
 
+  /// For the library itself.
+  const PackedPages& pages() const { return *pages_; }
+
  private:
   PackedVolume();
   Result<Voxel> sample(Index3 voxel, int level, Ancestors& last) const;
@@ -127,10 +151,12 @@ class PackedVolume {
   VolumeInfo info_;
   PackedParams params_;
   std::vector<PackedLevel> levels_;
+  int finest_ = 0;
   std::unique_ptr<PackedPages> pages_;
 };
 
-/// A level of a file as a source; info() has that level's dims and place.
+/// A level of a file as a source; info() has that level's dims and place. Errors: ErrorCode::usage where
+/// there is no such level; ErrorCode::input where the file was cut before it.
 Result<std::unique_ptr<VolumeSource>> open_source(std::shared_ptr<const PackedVolume> volume, int level);
 
 }  // namespace voxkit::svmm

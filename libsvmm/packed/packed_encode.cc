@@ -2,11 +2,13 @@
 // page by page.
 #include <fmt/format.h>
 
+#include <array>
 #include <cmath>
 #include <cstring>
 #include <limits>
 
 #include "formats/copy.h"
+#include "formats/full_scale.h"
 #include "formats/mapped_file.h"
 #include "formats/parallel.h"
 #include "formats/reservation.h"
@@ -17,13 +19,17 @@
 #include "libsvmm/packed/packed_layout.h"
 #include "libsvmm/packed/raster.h"
 #include "libsvmm/packed/survey.h"
+#include "libsvmm/packed/target.h"
 
 namespace voxkit::svmm {
 namespace {
 
-/// How far voxels of coarser levels of 8 bits may be from means: what this saves is more than half of what
-/// levels of clean volumes cost.
+/// How far voxels of coarser levels of 8 bits may be from means: this saves up to half of what levels of
+/// clean volumes cost.
 constexpr uint32_t bound_of_coarse_bytes = 2;
+/// Of a level, to learn what a bound leads to: fitting takes much longer than coding.
+constexpr uint64_t fewest_fitted = 16, most_fitted = 64, share_fitted = 8;
+constexpr int sampling_rounds = 2;
 
 /// Reads pages of a level as codes.
 class PageReader {
@@ -31,6 +37,10 @@ class PageReader {
   /// What is read goes through `raster`.
   PageReader(VolumeSource& source, const PageGrid& grid, const PackedParams& params, const Raster& raster)
       : source_(source), grid_(grid), params_(params), raster_(raster) {}
+
+  /// The sum of squared differences between the voxels of the page that was read last and what their codes
+  /// stand for; where both are finite.
+  double squared_error() const { return squared_error_; }
 
   /// Reads the pages `first` to `last`, which are in one row, and calls take(number, codes, extent) for each.
   template <class Take>
@@ -70,15 +80,18 @@ class PageReader {
   Status codes_of_floats(ConstVoxelSpan in, Index3 size, uint64_t number, const Take& take) {
     uint32_t codes[page::max_voxels];
     uint32_t* out = codes;
+    squared_error_ = 0;
     for (int64_t z = 0; z < size.z; ++z)
       for (int64_t y = 0; y < size.y; ++y) {
         const auto* const row = reinterpret_cast<const float*>(in.row(y, z));
         for (int64_t x = 0; x < size.x; ++x) {
           *out = params_.map.code(row[x]);
-          if (params_.map.kind == CodeKind::steps && std::isfinite(row[x]) &&
-              !(std::abs(static_cast<double>(params_.map.value(*out)) - static_cast<double>(row[x])) <=
-                params_.max_error))
-            return fail(ErrorCode::internal, {}, "a step further than the bound");
+          if (params_.map.kind == CodeKind::steps && std::isfinite(row[x])) {
+            const double error = static_cast<double>(params_.map.value(*out)) - static_cast<double>(row[x]);
+            if (!(std::abs(error) <= params_.max_error))
+              return fail(ErrorCode::internal, {}, "a step further than the bound");
+            squared_error_ += error * error;
+          }
           ++out;
         }
       }
@@ -90,7 +103,20 @@ class PageReader {
   const PackedParams& params_;
   const Raster& raster_;
   std::vector<std::byte> voxels_;
+  double squared_error_ = 0;
 };
+
+/// Of a page that was read, and decoded again.
+template <class T>
+double squared_error(const PageReader& reader, std::span<const T> codes, std::span<const T> decoded) {
+  if constexpr (sizeof(T) == 4) return reader.squared_error();  // codes of floats are kept
+  uint64_t sum = 0;
+  for (size_t i = 0; i < decoded.size(); ++i) {
+    const int64_t error = int64_t{codes[i]} - int64_t{decoded[i]};
+    sum += static_cast<uint64_t>(error * error);
+  }
+  return static_cast<double>(sum);
+}
 
 /// The codes of a coarser level as they were decoded, in a temporary file, page by page.
 class DecodedLevel {
@@ -127,22 +153,81 @@ class DecodedLevel {
 
 class Encoder {
  public:
-  Encoder(VolumeSource& source, const PackedOptions& options, const ByteSink& sink, Context& ctx)
-      : source_(source),
-        info_(source.info()),
-        ctx_(ctx),
-        survey_(info_.format),
-        container_(sink, Codec::svmm, container_version_for(info_), 0, *ctx.memory) {
+  Encoder(VolumeSource& source, const PackedOptions& options, Context& ctx)
+      : source_(source), info_(source.info()), ctx_(ctx), survey_(info_.format) {
     params_.page_side = options.page_side;
-    const bool floats = info_.format == VoxelFormat::float32;
-    params_.max_error = floats ? options.max_error : std::floor(options.max_error);
     params_.levels = options.levels ? level_count(info_.dims, options.page_side) : 1;
   }
 
-  Result<PackedParams> run() {
+  Result<PackedParams> run(double max_error, const ByteSink& sink) {
     VOX_CHECK(prepare());
-    VOX_CHECK(add_volume_info(container_, info_));
-    VOX_CHECK(container_.add(packed_kind, 0, 0, pack_params(params_)));
+    VOX_CHECK(write(max_error, sink));
+    return params_;
+  }
+
+  /// The bound is found by samples; the whole volume says how far these are off.
+  Result<PackedParams> run(const PackedTarget& target, const ByteSink& sink) {
+    VOX_CHECK(prepare());
+    const bool floats = info_.format == VoxelFormat::float32, psnr = target.kind == PackedTarget::Kind::psnr;
+    const std::vector<uint32_t> values = floats ? std::vector<uint32_t>() : survey_.values();
+    const ValueRange range =
+        floats ? survey_.range()
+               : ValueRange{static_cast<double>(values.front()), static_cast<double>(values.back())};
+    const double extent = range.hi - range.lo, peak = full_scale(info_, range);
+    const auto voxels = static_cast<double>(*checked_voxels(info_.dims));
+    const auto measure = [&](const Written& w) {
+      return psnr ? 10 * std::log10(peak * peak * voxels / w.squared_error) : 8 * w.bytes / voxels;
+    };
+    // Errors are spread evenly within the bound where it is small.
+    const double error = std::sqrt(3.0) * peak * std::pow(10, -target.value / 20);
+    BoundSearch search(target, !floats, floats ? ValueMap::least_error(range) : 1, extent);
+    std::optional<double> bound = search.next(psnr ? error : 0);
+    while (bound) {
+      VOX_TRY(const Written sampled, sample(*bound, psnr));
+      search.add(*bound, measure(sampled));
+      bound = search.next(std::ldexp(extent, -static_cast<int>(target.value) - 1));
+    }
+    struct Attempt {
+      double bound = 0, measured = 0;
+      PackedParams params;
+      std::unique_ptr<TemporaryFile> file = std::make_unique<TemporaryFile>("the compressed volume");
+    };
+    std::optional<Attempt> kept;
+    for (int i = 0; i < 2; ++i) {
+      Attempt next;
+      next.bound = search.best();
+      if (kept && kept->bound == next.bound) break;
+      VOX_TRY(const Written written, write(next.bound, [&](auto bytes) { return next.file->write(bytes); }));
+      next.measured = measure(written);
+      next.params = params_;
+      search.correct(next.bound, next.measured);
+      const bool done = search.near(next.measured);
+      if (!kept || search.better(next.measured, kept->measured)) kept = std::move(next);
+      if (done) break;
+    }
+    params_ = kept->params;
+    ctx_.note(fmt::format("greatest error {:.6g}: {:.6g} {}", params_.max_error, kept->measured,
+                          psnr ? "dB" : "bits a voxel"));
+    VOX_TRY(const auto file, kept->file->map());
+    VOX_CHECK(sink(file->bytes()));
+    return params_;
+  }
+
+ private:
+  /// What came of a bound.
+  struct Written {
+    double bytes = 0, squared_error = 0;
+  };
+
+  /// Encodes the volume within a bound. After the first pass, any number of times.
+  Result<Written> write(double max_error, const ByteSink& sink) {
+    decoded_.reset();
+    squared_error_ = 0;
+    VOX_CHECK(set_bound(max_error));
+    if (params_.map.kind == CodeKind::steps) VOX_CHECK(choose_map());
+    ContainerWriter container(sink, Codec::svmm, container_version_for(info_), 0, *ctx_.memory);
+    VOX_CHECK(add_volume_info(container, info_));
+    VOX_CHECK(container.add(packed_kind, 0, 0, pack_params(params_)));
     // The coarsest level has no parents; the model of those between is fitted to the largest of them.
     const int top = params_.levels - 1;
     std::optional<page::Model> model;
@@ -150,15 +235,41 @@ class Encoder {
       if (level == top || level == top - 1 || level == 0) {
         const int fitted = level == 0 || level == top ? level : 1;
         VOX_TRY(model, fit(fitted));
-        VOX_CHECK(container_.add(model_kind, static_cast<uint32_t>(fitted), 0, model->serialise()));
+        VOX_CHECK(container.add(model_kind, static_cast<uint32_t>(fitted), 0, model->serialise()));
       }
-      VOX_CHECK(encode(level, *model));
+      VOX_CHECK(encode(level, *model, container));
+      // What is there by now is a file of the coarser levels.
+      VOX_CHECK(level == 0 ? container.finish() : container.checkpoint());
     }
-    VOX_CHECK(container_.finish());
-    return params_;
+    return Written{static_cast<double>(container.bytes_written()), squared_error_};
   }
 
- private:
+  /// About what would come of a bound; with `only_error` no bytes.
+  Result<Written> sample(double max_error, bool only_error) {
+    decoded_.reset();
+    VOX_CHECK(set_bound(max_error));
+    Written all;
+    if (only_error && max_error == 0) return all;
+    if (only_error && info_.format == VoxelFormat::float32) {
+      VOX_TRY(all.squared_error, error_of_steps());
+      return all;
+    }
+    for (int level = 0; level < std::min(params_.levels, only_error ? 1 : 2); ++level) {
+      const uint64_t pages = grid(level).pages();
+      VOX_TRY(const page::Model model,
+              fit(level, std::clamp(pages / share_fitted, fewest_fitted, most_fitted), sampling_rounds));
+      VOX_TRY(const Sampled few, encode_samples(level, model));
+      const Index3 dims = grid(level).dims;
+      const double times = static_cast<double>(dims.x * dims.y * dims.z) / few.voxels;
+      // Levels above the second have a seventh of its voxels.
+      const double levels = level > 0 && level + 1 < params_.levels ? 8.0 / 7 : 1;
+      all.bytes +=
+          static_cast<double>(model.serialise().size()) + static_cast<double>(few.bytes) * times * levels;
+      if (level == 0) all.squared_error = few.squared_error * times;
+    }
+    return all;
+  }
+
   VolumeSource& source(int level) { return level == 0 ? source_ : *coarser_[static_cast<size_t>(level - 1)]; }
   const Raster& raster(int level) const { return level == 0 ? all_values_ : raster_; }
   /// Of the codes of a level, and of integers of their samples.
@@ -183,56 +294,103 @@ class Encoder {
         coarser_.push_back(std::move(next));
       }
     }
+    return {};
+  }
+
+  /// What follows from a bound and the values that there are.
+  Status set_bound(double max_error) {
+    params_.max_error = max_error;
     if (info_.format == VoxelFormat::float32) {
-      VOX_CHECK(choose_map());
-    } else if (!has_no_means(info_) && !info_.fill) {
-      const auto values = survey_.values();
-      Raster raster(values);
-      if (raster.step() > 2 * params_.max_error) raster_ = std::move(raster);
-      coarse_bytes_ =
-          info_.format == VoxelFormat::density8 && !values.empty() && values.back() - values.front() >= 128;
+      params_.map = ValueMap::for_floats(survey_.range(), max_error);
+      if (params_.map.kind == CodeKind::ordered) params_.max_error = 0;
+      return params_.map.kind == CodeKind::steps ? place_steps() : Status();
     }
+    params_.max_error = std::floor(max_error);
+    raster_ = {};
+    coarse_bytes_ = false;
+    if (has_no_means(info_) || info_.fill) return {};
+    const auto values = survey_.values();
+    Raster raster(values);
+    if (raster.step() > 2 * params_.max_error) raster_ = std::move(raster);
+    coarse_bytes_ =
+        info_.format == VoxelFormat::density8 && !values.empty() && values.back() - values.front() >= 128;
     return {};
   }
 
-  /// Steps within the bound, or, where these take more bytes, all bits.
+  /// Steps from the least value or through 0: volumes are full of one of these, as a rule, or of values
+  /// around it, and have much smaller errors where it is a step itself.
+  Status place_steps() {
+    const ValueMap from_least = params_.map;
+    VOX_TRY(const double error_from_least, error_of_steps());
+    params_.map = from_least.through_zero();
+    VOX_TRY(const double error_through_zero, error_of_steps());
+    if (!(error_through_zero < error_from_least)) params_.map = from_least;
+    return {};
+  }
+
+  /// About what is lost of floats, whose codes are kept as they are: nothing but steps changes a voxel.
+  Result<double> error_of_steps() {
+    double error = 0, voxels = 0;
+    VOX_CHECK(sample_pages(0, most_sampled_pages,
+                           [&](const PageReader& reader, uint64_t, auto codes, page::Extent) -> Status {
+                             error += reader.squared_error();
+                             voxels += static_cast<double>(codes.size());
+                             return {};
+                           }));
+    return error * static_cast<double>(*checked_voxels(info_.dims)) / voxels;
+  }
+
+  /// Of floats: steps within the bound, or, where these take more bytes, all bits.
   Status choose_map() {
-    params_.map.kind = CodeKind::ordered;
-    const ValueMap steps = ValueMap::for_floats(survey_.range(), params_.max_error);
-    if (steps.kind == CodeKind::steps) {
-      VOX_TRY(const page::Model exact, fit(0));
-      VOX_TRY(const uint64_t exact_bytes, sampled_bytes(0, exact));
-      params_.map = steps;
-      VOX_TRY(const page::Model bounded, fit(0));
-      VOX_TRY(const uint64_t bounded_bytes, sampled_bytes(0, bounded));
-      if (exact_bytes < bounded_bytes) params_.map = {CodeKind::ordered, 0, 1};
-    }
-    if (params_.map.kind == CodeKind::ordered) params_.max_error = 0;
+    const ValueMap steps = params_.map, ordered{CodeKind::ordered, 0, 1};
+    params_.map = ordered;
+    VOX_TRY(const page::Model exact, fit(0));
+    VOX_TRY(const Sampled all_bits, encode_samples(0, exact));
+    params_.map = steps;
+    VOX_TRY(const page::Model bounded, fit(0));
+    VOX_TRY(const Sampled in_steps, encode_samples(0, bounded));
+    if (all_bits.bytes + exact.serialise().size() >= in_steps.bytes + bounded.serialise().size()) return {};
+    params_.map = ordered;
+    params_.max_error = 0;
     return {};
   }
 
-  /// Pages of a level that models are fitted to.
+  /// Up to `most` pages of a level, that models are fitted to: calls take(reader, number, codes, extent).
   template <class Take>
-  Status sample_pages(int level, const Take& take) {
+  Status sample_pages(int level, uint64_t most, const Take& take) {
     const PageGrid pages = grid(level);
     PageReader reader(source(level), pages, params_, raster(level));
-    for (const uint64_t number : spread_pages(pages.pages(), most_sampled_pages))
-      VOX_CHECK(reader.read(number, number + 1, take));
+    for (const uint64_t number : spread_pages(pages.pages(), most))
+      VOX_CHECK(reader.read(number, number + 1, [&](uint64_t page, auto codes, page::Extent extent) {
+        return take(reader, page, codes, extent);
+      }));
     return {};
   }
-  /// Bytes of these pages, and of the model.
-  Result<uint64_t> sampled_bytes(int level, const page::Model& model) {
-    std::vector<std::byte> bytes = model.serialise();
-    VOX_CHECK(sample_pages(level, [&](uint64_t number, auto codes, page::Extent extent) -> Status {
-      using T = std::remove_const_t<typename decltype(codes)::element_type>;
-      std::vector<T> codes_above;
-      page::Parent<T> parent;
-      if (model.has_parents()) {
-        VOX_TRY(parent, parent_of(level, number, codes_above));
-      }
-      return page::encode_page(model, codes, extent, bytes, parent);
-    }));
-    return bytes.size();
+  struct Sampled {
+    uint64_t bytes = 0;  ///< without the model
+    double squared_error = 0, voxels = 0;
+  };
+  Result<Sampled> encode_samples(int level, const page::Model& model) {
+    Sampled sampled;
+    std::vector<std::byte> bytes;
+    VOX_CHECK(sample_pages(
+        level, most_sampled_pages,
+        [&](const PageReader& reader, uint64_t number, auto codes, page::Extent extent) -> Status {
+          using T = std::remove_const_t<typename decltype(codes)::element_type>;
+          std::vector<T> codes_above;
+          page::Parent<T> parent;
+          if (model.has_parents()) {
+            VOX_TRY(parent, parent_of(level, number, codes_above));
+          }
+          std::array<T, page::max_voxels> room;
+          const std::span<T> decoded(room.data(), codes.size());
+          VOX_CHECK(page::encode_page(model, codes, extent, bytes, parent, decoded));
+          sampled.squared_error += squared_error<T>(reader, codes, decoded);
+          sampled.voxels += static_cast<double>(codes.size());
+          return {};
+        }));
+    sampled.bytes = bytes.size();
+    return sampled;
   }
 
   /// The parents of a page: as they were decoded, or, where that is still to come, about so, in `room`.
@@ -256,23 +414,27 @@ class Encoder {
     return parent;
   }
 
-  Result<page::Model> fit(int level) {
+  Result<page::Model> fit(int level, uint64_t most_pages = most_sampled_pages,
+                          int rounds = page::ModelOptions().rounds) {
     page::ModelBuilder builder;
     VOX_TRY(const Reservation memory,
             Reservation::take(2 * most_sampled_pages * page::max_voxels * sizeof(uint32_t),
                               "pages to fit a model to", ctx_));
     page::ModelOptions options;
     options.parents = level + 1 < params_.levels;
-    VOX_CHECK(sample_pages(level, [&](uint64_t number, auto codes, page::Extent extent) -> Status {
-      using T = std::remove_const_t<typename decltype(codes)::element_type>;
-      std::vector<T> room;
-      page::Parent<T> parent;
-      if (options.parents) {
-        VOX_TRY(parent, parent_of(level, number, room));
-      }
-      builder.add(codes, extent, parent);
-      return {};
-    }));
+    options.rounds = rounds;
+    VOX_CHECK(
+        sample_pages(level, most_pages,
+                     [&](const PageReader&, uint64_t number, auto codes, page::Extent extent) -> Status {
+                       using T = std::remove_const_t<typename decltype(codes)::element_type>;
+                       std::vector<T> room;
+                       page::Parent<T> parent;
+                       if (options.parents) {
+                         VOX_TRY(parent, parent_of(level, number, room));
+                       }
+                       builder.add(codes, extent, parent);
+                       return {};
+                     }));
     if (info_.format == VoxelFormat::float32) {
       const bool steps = params_.map.kind == CodeKind::steps;
       options.max_sample = steps ? params_.map.code(static_cast<float>(survey_.range().hi)) : 0xffffffff;
@@ -294,15 +456,17 @@ class Encoder {
         exact.values = values;
         VOX_TRY(const page::Model bounded, builder.build(options));
         VOX_TRY(const page::Model lossless, builder.build(exact));
-        VOX_TRY(const uint64_t bounded_bytes, sampled_bytes(level, bounded));
-        VOX_TRY(const uint64_t lossless_bytes, sampled_bytes(level, lossless));
-        return lossless_bytes < bounded_bytes ? lossless : bounded;
+        VOX_TRY(const Sampled with_bound, encode_samples(level, bounded));
+        VOX_TRY(const Sampled without, encode_samples(level, lossless));
+        const bool smaller =
+            without.bytes + lossless.serialise().size() < with_bound.bytes + bounded.serialise().size();
+        return smaller ? lossless : bounded;
       }
     }
     return builder.build(options);
   }
 
-  Status encode(int level, const page::Model& model) {
+  Status encode(int level, const page::Model& model, ContainerWriter& container) {
     const PageGrid pages = grid(level);
     auto decoded = std::make_unique<DecodedLevel>(level, pages, code_bytes(info_.format));
     std::vector<std::byte> batch;  // of decoded pages
@@ -312,6 +476,7 @@ class Encoder {
                      first = part * pages.pages_a_part(),
                      last = std::min(end_part * pages.pages_a_part(), pages.pages());
       std::vector<std::vector<std::byte>> encoded(last - first);
+      std::vector<double> errors(last - first);  // squared, of level 0
       const auto runs = runs_of(pages, first, last);
       if (level > 0) batch.resize((last - first) * decoded->page_bytes());
       VOX_CHECK(parallel_for(ctx_, static_cast<int64_t>(runs.size()), [&](int64_t i) -> Status {
@@ -321,18 +486,23 @@ class Encoder {
           using T = std::remove_const_t<typename decltype(codes)::element_type>;
           page::Parent<T> parent;
           if (model.has_parents()) parent = decoded_->parent_of<T>(pages.index(number));
-          std::span<T> kept;
-          if (level > 0)
-            kept = {reinterpret_cast<T*>(batch.data() + (number - first) * decoded->page_bytes()),
-                    codes.size()};
-          return page::encode_page(model, codes, extent, encoded[number - first], parent, kept);
+          std::array<T, page::max_voxels> room;
+          T* const kept = level == 0
+                              ? room.data()
+                              : reinterpret_cast<T*>(batch.data() + (number - first) * decoded->page_bytes());
+          const std::span<T> again(kept, codes.size());
+          const Status status =
+              page::encode_page(model, codes, extent, encoded[number - first], parent, again);
+          if (level == 0) errors[number - first] = squared_error<T>(reader, codes, again);
+          return status;
         });
       }));
+      for (const double error : errors) squared_error_ += error;
       if (level > 0) VOX_CHECK(decoded->write(batch));
       std::span<const std::vector<std::byte>> left = encoded;
       for (uint64_t p = part; p < end_part; ++p) {
         const uint64_t count = pages.pages_of(p);
-        VOX_CHECK(container_.add(pages_kind, static_cast<uint32_t>(level), p, pack_part(left.first(count))));
+        VOX_CHECK(container.add(pages_kind, static_cast<uint32_t>(level), p, pack_part(left.first(count))));
         left = left.subspan(count);
       }
       source(level).release(pages.box(first).lo.z, pages.box(last - 1).lo.z);
@@ -353,7 +523,7 @@ class Encoder {
   bool coarse_bytes_ = false;  ///< whether these are of 8 bits, and need not be exact
   std::vector<std::unique_ptr<VolumeSource>> coarser_;
   std::unique_ptr<DecodedLevel> decoded_;  ///< the level above that which comes next
-  ContainerWriter container_;
+  double squared_error_ = 0;               ///< of level 0
 };
 
 }  // namespace
@@ -361,6 +531,9 @@ class Encoder {
 Result<PackedParams> encode_packed(VolumeSource& source, const PackedOptions& options, const ByteSink& sink,
                                    Context& ctx) {
   const VolumeInfo& info = source.info();
+  if (options.target && is_color(info.format))
+    return bad_usage(fmt::format("a target for voxels of {}: expected scalars, or a bound (--max-error)",
+                                 name(info.format)));
   if (options.page_side != 8 && options.page_side != 16)
     return bad_usage(fmt::format("pages of {} voxels: expected 8 or 16", options.page_side));
   if (!(options.max_error >= 0 && options.max_error <= 1e300))
@@ -368,16 +541,22 @@ Result<PackedParams> encode_packed(VolumeSource& source, const PackedOptions& op
   const bool floats = info.format == VoxelFormat::float32;
   if (options.max_error >= (floats ? 1e300 : 0x1p31 - 1))
     return bad_usage(fmt::format("--max-error {}: expected less than 2^31 - 1", options.max_error));
-  if (options.max_error > 0 && (info.is_labels || info.labels))
+  if (options.target && options.max_error > 0)
+    return bad_usage("a bound, and a target, for which one is to be found: expected one of them");
+  if (options.target && !(options.target->value > 0 && options.target->value <= 1000))
+    return bad_usage(
+        fmt::format("a target of {}: expected a number above 0, up to 1000", options.target->value));
+  if ((options.max_error > 0 || options.target) && (info.is_labels || info.labels))
     return bad_usage(
         "labels have no values between them: expected a bound of 0 (--max-error 0 or --quality 100)");
-  if (options.max_error >= 1 && info.fill && !floats)
+  if ((options.max_error >= 1 || options.target) && info.fill && !floats)
     return bad_usage(
         "integers with a fill value, which is to come back as it is: expected a bound of 0 (--max-error 0 or "
         "--quality 100)");
   if (source.forward_only()) return fail(ErrorCode::internal, {}, "a source that was not spooled");
   if (is_color(info.format)) return encode_packed_colors(source, options, sink, ctx);
-  return Encoder(source, options, sink, ctx).run();
+  Encoder encoder(source, options, ctx);
+  return options.target ? encoder.run(*options.target, sink) : encoder.run(options.max_error, sink);
 }
 
 }  // namespace voxkit::svmm

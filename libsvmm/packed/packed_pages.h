@@ -3,6 +3,7 @@
 
 #include <array>
 #include <atomic>
+#include <cstring>
 #include <memory>
 #include <optional>
 #include <vector>
@@ -49,6 +50,28 @@ struct PackedPages {
     return entry(container, level, levels[static_cast<size_t>(level)].pages, number);
   }
 };
+
+/// Puts the codes of a page where its voxels go, as far as they are in `box`; `out` is at the box's corner.
+template <class T>
+void place(const T* codes, const Box& page, const Box& box, const ValueMap& map, VoxelFormat format,
+           VoxelSpan out) {
+  const Box part = intersect(page, box);
+  const Index3 size = page.size();
+  for (int64_t z = part.lo.z; z < part.hi.z; ++z)
+    for (int64_t y = part.lo.y; y < part.hi.y; ++y) {
+      const T* const from =
+          codes + ((z - page.lo.z) * size.y + (y - page.lo.y)) * size.x + (part.lo.x - page.lo.x);
+      std::byte* const to =
+          out.row(y - box.lo.y, z - box.lo.z) + (part.lo.x - box.lo.x) * voxel_bytes(format);
+      const auto count = static_cast<size_t>(part.hi.x - part.lo.x);
+      if constexpr (sizeof(T) < 4) {
+        std::memcpy(to, from, count * sizeof(T));
+      } else {
+        auto* const floats = reinterpret_cast<float*>(to);
+        for (size_t x = 0; x < count; ++x) floats[x] = map.value(from[x]);
+      }
+    }
+}
 
 /// Names the page that is damaged.
 Error at_page(const Container& container, int level, uint64_t number, const PageGrid& grid,

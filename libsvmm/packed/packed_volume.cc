@@ -53,32 +53,6 @@ Error at_page(const Container& container, int level, uint64_t number, const Page
           fmt::format("level {}, page at {},{},{}: {}", level, lo.x, lo.y, lo.z, error.what)};
 }
 
-namespace {
-
-/// Puts the codes of a page where its voxels go, as far as they are in `box`; `out` is at the box's corner.
-template <class T>
-void place(const T* codes, const Box& page, const Box& box, const ValueMap& map, VoxelFormat format,
-           VoxelSpan out) {
-  const Box part = intersect(page, box);
-  const Index3 size = page.size();
-  for (int64_t z = part.lo.z; z < part.hi.z; ++z)
-    for (int64_t y = part.lo.y; y < part.hi.y; ++y) {
-      const T* const from =
-          codes + ((z - page.lo.z) * size.y + (y - page.lo.y)) * size.x + (part.lo.x - page.lo.x);
-      std::byte* const to =
-          out.row(y - box.lo.y, z - box.lo.z) + (part.lo.x - box.lo.x) * voxel_bytes(format);
-      const auto count = static_cast<size_t>(part.hi.x - part.lo.x);
-      if constexpr (sizeof(T) < 4) {
-        std::memcpy(to, from, count * sizeof(T));
-      } else {
-        auto* const floats = reinterpret_cast<float*>(to);
-        for (size_t x = 0; x < count; ++x) floats[x] = map.value(from[x]);
-      }
-    }
-}
-
-}  // namespace
-
 bool is_packed(const Container& container) {
   return container.codec() == Codec::svmm && container.has_chunk(packed_kind);
 }
@@ -105,8 +79,8 @@ Result<std::shared_ptr<const PackedVolume>> PackedVolume::open(std::shared_ptr<c
   for (int i = 0; i < levels; ++i) {
     PackedPages::Level level;
     level.grid = PageGrid(level_dims(volume->info_.dims, i), volume->params_.page_side);
-    const uint64_t parts = level.grid.parts();
-    if (parts > table.size()) return bad(fmt::format("fewer chunks PAGE than the {} of level {}", parts, i));
+    // A level with fewer is not there, and takes no memory.
+    const uint64_t parts = level.grid.parts() <= table.size() ? level.grid.parts() : 0;
     level.pages = PartChunks(pages_kind, channels, parts);
     if (colors) level.masks = PartChunks(mask_kind, 1, parts);
     volume->levels_.push_back({level.grid.dims, level.grid.count, 0, 0, 0});
@@ -138,19 +112,35 @@ Result<std::shared_ptr<const PackedVolume>> PackedVolume::open(std::shared_ptr<c
     *slot = i;
     PackedLevel& level = volume->levels_[entry.index];
     (part ? level.page_bytes : level.model_bytes) += entry.length;
-    level.end = std::max(level.end, entry.offset + entry.stored);
+    level.end = i + 1 < table.size() ? table[i + 1].offset : container->file_bytes();
   }
-  for (size_t i = 0; i < pages.levels.size(); ++i)
-    for (const PartChunks* const chunks : {&pages.levels[i].pages, &pages.levels[i].masks})
+  // Of a file that was cut the finest levels have no pages at all.
+  const auto absent = [&](const PackedPages::Level& level) {
+    const auto none_of = [&](size_t chunk) { return chunk == none; };
+    return std::ranges::all_of(level.pages.chunks, none_of) &&
+           std::ranges::all_of(level.masks.chunks, none_of);
+  };
+  while (volume->finest_ + 1 < levels && absent(pages.levels[static_cast<size_t>(volume->finest_)]))
+    ++volume->finest_;
+  const auto finest = static_cast<size_t>(volume->finest_);
+  for (size_t i = finest; i < pages.levels.size(); ++i) {
+    const PackedPages::Level& level = pages.levels[i];
+    if (level.pages.chunks.size() < level.grid.parts())
+      return bad(fmt::format("fewer chunks PAGE than the {} of level {}", level.grid.parts(), i));
+    for (const PartChunks* const chunks : {&level.pages, &level.masks})
       for (size_t part = 0; part < chunks->chunks.size(); ++part)
         if (chunks->chunks[part] == none)
           return bad(fmt::format("no chunk {} {}.{}", chunks->kind == mask_kind ? "MASK" : "PAGE", i, part));
+  }
   for (size_t i = 0; i < pages.levels.size(); ++i) {
     PackedPages::Level& level = pages.levels[i];
     const auto of_level = std::span(models[i]).first(channels + (colors ? 1 : 0));
-    if (std::ranges::all_of(of_level, [](size_t at) { return at == none; }) && i > 0) {
-      level.model = pages.levels[i - 1].model;
-      level.color = pages.levels[i - 1].color;
+    if (std::ranges::all_of(of_level, [](size_t at) { return at == none; })) {
+      if (i > 0) {
+        level.model = pages.levels[i - 1].model;
+        level.color = pages.levels[i - 1].color;
+      }
+      if (i >= finest && !level.model && !level.color) return bad(fmt::format("no chunk MODL {}.0", finest));
       continue;
     }
     std::vector<page::Model> found;
@@ -370,7 +360,7 @@ std::optional<Voxel> PackedVolume::uniform(const Box& box, int level) const {
 
 Status PackedVolume::check(Context& ctx) const {
   for (size_t i = 0; i < container_->table().size(); ++i) VOX_CHECK(container_->chunk(i));
-  for (size_t level = 0; level < pages_->levels.size(); ++level) {
+  for (auto level = static_cast<size_t>(finest_); level < pages_->levels.size(); ++level) {
     const PageGrid& grid = pages_->levels[level].grid;
     constexpr int64_t run = 32;  // pages
     const Index3 runs((grid.count.x + run - 1) / run, grid.count.y, grid.count.z);
@@ -421,6 +411,10 @@ Result<std::unique_ptr<VolumeSource>> open_source(std::shared_ptr<const PackedVo
   const int levels = volume->params().levels;
   if (level < 0 || level >= levels)
     return bad_usage(fmt::format("--level {}: the file has levels 0 to {}", level, levels - 1));
+  if (level < volume->finest())
+    return bad_input(volume->container().name(),
+                     fmt::format("level {} is not there, the file was cut: expected --level {}, or up to {}",
+                                 level, volume->finest(), levels - 1));
   return std::make_unique<PackedSource>(std::move(volume), level);
 }
 

@@ -11,6 +11,13 @@ namespace {
 constexpr uint32_t sign = 0x80000000, first_step = 3;
 constexpr double most_steps = 0x1p31;
 
+/// Half a unit in the last place of the largest values is lost when a step becomes a float, and a little in
+/// the arithmetic of doubles.
+double rounding_of(ValueRange range) {
+  const double largest = std::max(std::abs(range.lo), std::abs(range.hi));
+  return std::ldexp(largest, -24) + std::ldexp(largest, -48);
+}
+
 }  // namespace
 
 uint32_t ValueMap::ordered(float value) {
@@ -42,13 +49,18 @@ float ValueMap::value(uint32_t code) const {
 ValueMap ValueMap::for_floats(ValueRange range, double max_error) {
   ValueMap map;
   map.kind = CodeKind::ordered;
-  // Half a unit in the last place of the largest values is lost when a step becomes a float, and a little in
-  // the arithmetic of doubles.
-  const double largest = std::max(std::abs(range.lo), std::abs(range.hi));
-  const double rounding = std::ldexp(largest, -24) + std::ldexp(largest, -48);
-  const double step = 2 * (max_error - rounding) * (1 - 0x1p-40);
+  const double step = 2 * (max_error - rounding_of(range)) * (1 - 0x1p-40);
   if (!(step > max_error) || (range.hi - range.lo) / step > most_steps) return map;
   return {CodeKind::steps, range.lo, step};
+}
+
+ValueMap ValueMap::through_zero() const {
+  return lo < 0 ? ValueMap{kind, -std::ceil(-lo / step) * step, step} : *this;
+}
+
+double ValueMap::least_error(ValueRange range) {
+  const double rounding = rounding_of(range);
+  return std::max(2.01 * rounding, rounding + std::ldexp(range.hi - range.lo, -31));
 }
 
 int code_bytes(VoxelFormat format) {

@@ -31,6 +31,10 @@ struct ValueMap {
   /// Floats within `max_error` of values from `lo` to `hi`: in steps of nearly twice that, or, where floats
   /// are too coarse, or too many, for steps, ordered bits. `max_error` 0: ordered.
   static ValueMap for_floats(ValueRange range, double max_error);
+  /// The same steps, moved down by less than one, so that one of them is 0; where 0 is not below them.
+  ValueMap through_zero() const;
+  /// A bound that is not much above the least one for which there are steps.
+  static double least_error(ValueRange range);
 };
 
 /// Bytes of a code: 1, 2 or 4.

@@ -9,7 +9,7 @@
 #include "libsvmm/packed/packed_layout.h"
 #include "tests/damage.h"
 #include "tests/libsvmm/packed_attack.h"
-#include "tests/libsvmm/packed_file.h"
+#include "tests/libsvmm/packed_files.h"
 #include "tests/libsvmm/volumes.h"
 
 namespace voxkit::svmm {

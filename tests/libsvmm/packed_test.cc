@@ -11,14 +11,12 @@
 #include "libsvmm/packed/packed_layout.h"
 #include "tests/damage.h"
 #include "tests/libsvmm/packed_attack.h"
-#include "tests/libsvmm/packed_file.h"
-#include "tests/libsvmm/volumes.h"
+#include "tests/libsvmm/packed_files.h"
 
 namespace voxkit::svmm {
 namespace {
 
 using namespace voxkit::svmm::test;
-using voxkit::test::Bytes;
 
 const VoxelFormat scalars[] = {VoxelFormat::density8, VoxelFormat::density16, VoxelFormat::float32,
                                VoxelFormat::bitmap};
@@ -57,16 +55,6 @@ double mean_at(const std::vector<double>& values, Index3 dims, Index3 at, bool f
   }
   return floats ? static_cast<double>(static_cast<float>(sum / count)) : std::floor(sum / count + 0.5);
 }
-std::vector<double> numbers(const Bytes& voxels, VoxelFormat format) {
-  std::vector<double> out;
-  for (size_t i = 0; i < voxels.size(); i += static_cast<size_t>(voxel_bytes(format))) {
-    Voxel v;
-    std::memcpy(v.bytes.data(), &voxels[i], static_cast<size_t>(voxel_bytes(format)));
-    out.push_back(format == VoxelFormat::float32 ? static_cast<double>(v.as<float>()) : v.as<uint32_t>());
-  }
-  return out;
-}
-
 /// Those of a level of `dims`.
 std::vector<double> means_of(const std::vector<double>& values, Index3 dims, VoxelFormat format) {
   const Index3 half = level_dims(dims, 1);

@@ -65,6 +65,7 @@ class Packed:
                 "chunk PAKP: byte {}: steps of {} from {}", at + 8, self.step, self.lo)
         self.check_chunks()
         self.models, self.masks = [], []  # of each level: the models of its channels, and that of its masks or None
+        models = masks = None  # of levels finer than the file has, where it was cut
         for level in range(self.count):
             if (b"MODL", level, 0) in container.chunks:
                 models, masks = [self.read_model(level, part) for part in range(self.channels)], None
@@ -74,6 +75,7 @@ class Packed:
                             "level {}: only some of its models have parents", level)
             self.models.append(models)
             self.masks.append(masks)
+        require(self.models[self.finest] is not None, "chunk table: chunk MODL {} is missing", self.finest)
         require(not models[0].parents, "chunks MODL: the model of level {} has parents", self.count - 1)
         self.known, self.parts = {}, {}  # pages that were decoded, and parts that were read
 
@@ -95,12 +97,17 @@ class Packed:
             require((kind, level, part) in unused, "chunk table: chunk {} {}.{} is missing", kind.decode(), level, part)
             unused.remove((kind, level, part))
 
+        # A file that was cut has no pages of the finest levels.
+        there = {level for kind, level, _ in unused if kind in (b"PAGE", b"MASK") and level < self.count}
+        self.finest = min(there, default=self.count - 1)
         for level in range(self.count):
-            if level == 0 or any(key[0] in (b"MODL", b"MMOD") and key[1] == level for key in unused):
+            if any(key[0] in (b"MODL", b"MMOD") and key[1] == level for key in unused):
                 for part in range(self.channels):
                     use(b"MODL", level, part)
                 if self.volume.colour:
                     use(b"MMOD", level, 0)
+            if level < self.finest:
+                continue
             parts = divide_up(math.prod(self.pages(level)), self.part_pages())
             require(parts <= len(unused), "chunk table: level {}: parts of chunk PAGE are missing", level)
             for part in range(parts):
@@ -241,8 +248,8 @@ def describe(packed):
         "params": {"layout": "packed", "page_side": packed.side, "codes": CODES[packed.codes],
                    "max_error": packed.max_error, "opaque": bool(packed.opaque),
                    "differences": bool(packed.differences)},
-        "palettes": [[len(m.palette) if m.has_palette else None for m in models] for models in packed.models],
-        "levels": [{"index": k, "dims": packed.dims(k), "pages": packed.pages(k)} for k in range(packed.count)],
+        "palettes": [[len(m.palette) if m.has_palette else None for m in models] for models in packed.models[packed.finest:]],
+        "levels": [{"index": k, "dims": packed.dims(k), "pages": packed.pages(k)} for k in range(packed.finest, packed.count)],
     }
 
 

@@ -204,6 +204,15 @@ class SmallFile(unittest.TestCase):
         self.coarse_page = bytearray((1, 1, 3))
         self.refused(container(self.chunks()), "value 3 above 2")
 
+    def test_cut(self):
+        """Level 1 alone, with its own model, or with that of level 0, which is not there."""
+        chunks = self.chunks()
+        for kept in (chunks[:4], chunks[:5]):
+            self.assertEqual(self.decode(container(kept), 1), bytes([200] * 9))
+            with self.assertRaisesRegex(Refused, "was cut"):
+                self.decode(container(kept))
+        self.refused(container(chunks[:2] + chunks[3:4]), "MODL 1 is missing")
+
     def test_parents(self):
         """Level 1 is 3, 7, 200, …, 200, 3, and each voxel of level 0 as its parent; the second page's is the last."""
         self.fine = Fields(version=2, bound=0, most=200)
@@ -350,6 +359,17 @@ class Tools(PackedCase):
         packed, decoded = self.compare(self.encode(self.path("in.nrrd"), "--page", 8, "--fill", 4))
         self.assertEqual(decoded, voxels)
         self.assertIn((b"PAGE", 0, 1), packed.container.chunks)
+
+    def test_cut(self):
+        """Files that end where a level does."""
+        data = as_raw(list(smooth(random.Random(4), (40, 9, 17), 255)), "u8")
+        file = read(self.encode_raw(data, (40, 9, 17), "u8", "--page", 8))
+        at = {(kind, level): chunk.offset for (kind, level, _), chunk in Container(file).chunks.items()}
+        # What comes behind levels 3, 2 and 1.
+        for level, behind in ((3, (b"MODL", 1)), (2, (b"PAGE", 1)), (1, (b"MODL", 0))):
+            write(self.path("cut.svmm"), file[:at[behind]])
+            packed, _ = self.compare(self.path("cut.svmm"))
+            self.assertEqual((packed.finest, packed.count), (level, 4))
 
     def test_built_ins_and_the_program(self):
         for source, options in (("marschner-lobb:19", ()), ("noise:17:2", ("--page", "8")), ("sphere:21", ("--levels", "off")),

@@ -29,12 +29,13 @@ Result<std::shared_ptr<const Container>> container_of(std::shared_ptr<const Mapp
   return Container::open(bytes, name, std::move(file), ctx.memory);
 }
 
-Result<Input> open_codec(std::shared_ptr<const Container> container, int level, Context& ctx) {
+/// `level`: none for the finest that there is.
+Result<Input> open_codec(std::shared_ptr<const Container> container, std::optional<int> level, Context& ctx) {
   const auto check_level = [&](int levels) -> Status {
-    if (level < levels) return {};
+    if (level.value_or(0) < levels) return {};
     return fail(
         ErrorCode::usage, container->name(),
-        "--level " + std::to_string(level) + ": expected a level from 0 to " + std::to_string(levels - 1));
+        "--level " + std::to_string(*level) + ": expected a level from 0 to " + std::to_string(levels - 1));
   };
   Input input;
   if (container->codec() == Codec::vq) {
@@ -52,12 +53,16 @@ Result<Input> open_codec(std::shared_ptr<const Container> container, int level, 
   if (svmm::is_packed(*container)) {
     VOX_TRY(input.packed, svmm::PackedVolume::open(container, *ctx.memory));
     VOX_CHECK(check_level(input.packed->params().levels));
-    VOX_TRY(input.source, svmm::open_source(input.packed, level));
+    const int finest = input.packed->finest();
+    VOX_TRY(input.source, svmm::open_source(input.packed, level.value_or(finest)));
+    if (finest > 0)
+      ctx.note(fmt::format("{}: the file was cut: of its levels 0 to {} those from {} on are there",
+                           container->name(), input.packed->params().levels - 1, finest));
     return input;
   }
   VOX_TRY(input.svmm, svmm::Volume::open(container));
   VOX_CHECK(check_level(static_cast<int>(input.svmm->levels().size())));
-  VOX_TRY(input.source, svmm::open_source(input.svmm, level));
+  VOX_TRY(input.source, svmm::open_source(input.svmm, level.value_or(0)));
   return input;
 }
 
@@ -143,7 +148,7 @@ Result<std::shared_ptr<const Container>> open_container(const std::string& name,
   return container_of(std::move(file), ctx);
 }
 
-Result<Input> open_compressed(const std::string& name, int level, Context& ctx) {
+Result<Input> open_compressed(const std::string& name, std::optional<int> level, Context& ctx) {
   VOX_TRY(auto container, open_container(name, ctx));
   return open_codec(std::move(container), level, ctx);
 }
@@ -151,7 +156,7 @@ Result<Input> open_compressed(const std::string& name, int level, Context& ctx) 
 Result<Input> open_spooled(std::shared_ptr<const MappedFile> file, const OpenOptions& options, Context& ctx) {
   if (is_container(file->bytes())) {
     VOX_TRY(auto container, container_of(std::move(file), ctx));
-    return open_codec(std::move(container), 0, ctx);
+    return open_codec(std::move(container), std::nullopt, ctx);
   }
   Input input;
   VOX_TRY(input.source, open_nrrd(stream_of(std::move(file)), options, ctx));
@@ -161,7 +166,7 @@ Result<Input> open_spooled(std::shared_ptr<const MappedFile> file, const OpenOpt
 namespace {
 
 Result<Input> open_as_it_is(const std::string& name, const OpenOptions& options, Context& ctx) {
-  if (is_compressed(name)) return open_compressed(name, 0, ctx);
+  if (is_compressed(name)) return open_compressed(name, std::nullopt, ctx);
   if (color::is_terrain(name))
     return fail(ErrorCode::usage, name,
                 "a built-in surface, not a volume: dagcolor-pack makes a .dagc file of it");

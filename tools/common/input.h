@@ -31,8 +31,9 @@ void declare_input_options(CommandLine& line, OpenOptions& options, bool type = 
 Result<Input> open_input(const std::string& name, const OpenOptions& options, Context& ctx);
 /// Opens what standard input held: a container or NRRD. It can be opened any number of times.
 Result<Input> open_spooled(std::shared_ptr<const MappedFile> file, const OpenOptions& options, Context& ctx);
-/// Opens a compressed volume only. `level`: of the mip-map, as the voxels of the source.
-Result<Input> open_compressed(const std::string& name, int level, Context& ctx);
+/// Opens a compressed volume only. `level`: of the mip-map, as the voxels of the source; none: the finest
+/// that there is, which for a packed file that was cut is not level 0. That is noted in a line.
+Result<Input> open_compressed(const std::string& name, std::optional<int> level, Context& ctx);
 /// The container in a file or on standard input.
 Result<std::shared_ptr<const Container>> open_container(const std::string& name, Context& ctx);
 

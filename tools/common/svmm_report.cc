@@ -60,16 +60,15 @@ Json params_json(const svmm::PackedParams& params) {
   return json;
 }
 
-Json levels_json(std::span<const svmm::PackedLevel> levels) {
+Json levels_json(const svmm::PackedVolume& volume) {
   Json array = Json::array();
-  int64_t index = 0;
-  for (const svmm::PackedLevel& level : levels) {
+  for (int64_t index = volume.finest(); index < volume.params().levels; ++index) {
+    const svmm::PackedLevel& level = volume.levels()[static_cast<size_t>(index)];
     Json json = Json::object();
     json.set("mip_factor", int64_t{1} << index).set("index", index).set("dims", level.dims);
     json.set("pages", level.pages.x * level.pages.y * level.pages.z).set("page_bytes", level.page_bytes);
     json.set("end", level.end);
     array.push(std::move(json));
-    ++index;
   }
   return array;
 }
@@ -80,12 +79,11 @@ std::string levels_text(const svmm::PackedVolume& volume) {
       fmt::format("params      layout packed, pages of {0} x {0} x {0}, greatest error {1:.6g}\n",
                   p.page_side, p.max_error);
   text += "level  factor  dims                     pages        bytes    ends at byte\n";
-  int index = 0;
-  for (const svmm::PackedLevel& l : volume.levels()) {
+  for (int index = volume.finest(); index < p.levels; ++index) {
+    const svmm::PackedLevel& l = volume.levels()[static_cast<size_t>(index)];
     text += fmt::format("{:>5}  {:>6}  {:<18}  {:>10}  {:>11}  {:>14}\n", index, int64_t{1} << index,
                         fmt::format("{} x {} x {}", l.dims.x, l.dims.y, l.dims.z),
                         l.pages.x * l.pages.y * l.pages.z, l.page_bytes, l.end);
-    ++index;
   }
   return text;
 }

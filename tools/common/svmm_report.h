@@ -22,7 +22,7 @@ Json levels_json(std::span<const svmm::Level> levels);
 
 // The same of layout packed; levels as lines of vox-info.
 Json params_json(const svmm::PackedParams& params);
-Json levels_json(std::span<const svmm::PackedLevel> levels);
+Json levels_json(const svmm::PackedVolume& volume);
 std::string levels_text(const svmm::PackedVolume& volume);
 
 }  // namespace voxkit::cli
