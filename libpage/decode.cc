@@ -139,7 +139,7 @@ Status decode_all(const Model& shared, std::span<const PageJob<T>> jobs, size_t*
       judge(&job, whole);
       continue;
     }
-    if (job.mask) {
+    if (job.mask && *job.mask != full_mask(job.extent)) {
       const PageJob<T>* const alone = &job;
       decode_group<Narrow, 1, true>(model, &alone, &whole);
       judge(&job, whole);

@@ -145,6 +145,7 @@ template <class T>
 void ModelBuilder::keep(std::span<const T> samples, Extent extent, const Parent<T>& parent,
                         const Mask* mask) {
   if (mask && mask->empty()) return;
+  if (mask && extent.valid() && *mask == full_mask(extent)) mask = nullptr;
   pages_.push_back({extent,
                     {samples.begin(), samples.end()},
                     {parent.samples.begin(), parent.samples.end()},

@@ -33,7 +33,7 @@ libcolor/textures -> formats formats/image libcolor/surface libcolor/terms libco
 libcolor          -> formats formats/image libcolor/surface libcolor/terms libcolor/dag libcolor/blocks libcolor/palette libcolor/textures
 libmetrics        -> formats formats/image
 librender         -> formats formats/image
-librender/cast    -> formats librender libsvmm libcolor libcolor/dag libcolor/surface
+librender/cast    -> formats librender libsvmm libsvmm/packed libcolor libcolor/dag libcolor/surface
 librender/dvr     -> formats librender librender/cast libsvmm libvq
 librender/device  -> formats librender librender/cast librender/dvr libsvmm libvq libcolor libcolor/dag
 """

@@ -223,6 +223,7 @@ class Packed:
 
 def decode(packed, level):
     """The voxels of a level."""
+    require(level >= packed.finest, "level {}: its chunks PAGE are missing: the file was cut", level)
     dims, size = packed.dims(level), packed.volume.voxel_bytes
     out = bytearray(math.prod(dims) * size)
     for z, y, x in itertools.product(*map(range, packed.pages(level)[::-1])):
