@@ -4,6 +4,7 @@
 #include <bit>
 #include <cmath>
 
+#include "formats/cpu.h"
 #include "libpage/parent_rows.h"
 
 namespace voxkit::page {
@@ -11,8 +12,8 @@ namespace {
 
 /// Solves a x = b for a symmetric positive definite matrix by its Cholesky factors, in one order of
 /// operations. False where it is not definite.
-bool solve_definite(std::array<std::array<double, tap_count>, tap_count>& a, std::array<double, tap_count>& b,
-                    size_t n) {
+template <class Row>
+bool solve_definite(std::array<Row, tap_count>& a, Row& b, size_t n) {
   for (size_t i = 0; i < n; ++i) {
     for (size_t j = 0; j <= i; ++j) {
       double sum = a[i][j];
@@ -38,8 +39,7 @@ bool solve_definite(std::array<std::array<double, tap_count>, tap_count>& a, std
 
 /// From fractions of one, with what they leave as that of the rest tap. False, and nothing changed, where
 /// they are larger than a model can hold.
-bool round_weights(std::span<const size_t> taps, const std::array<double, tap_count>& fractions, int rest,
-                   Weights& out) {
+bool round_weights(std::span<const size_t> taps, std::span<const double> fractions, int rest, Weights& out) {
   int32_t left = weight_one, size = 0;
   Weights fitted{};
   for (size_t i = 0; i < taps.size(); ++i) {
@@ -85,7 +85,38 @@ void Fit::add(std::span<const FitPage> pages, double noise) {
   }
 }
 
+namespace {
+
+template <class Equations, class Row>
+[[gnu::always_inline]] inline void add_all(Equations& sums, const Row& taps, size_t count, double weight,
+                                           double target) {
+  constexpr size_t width = 4;
+  for (size_t i = 0; i < count; ++i) {
+    const double weighted = weight * taps[i];
+    sums.targets[i] += weighted * target;
+    auto& row = sums.products[i];
+    for (size_t j = i / width * width; j < count; j += width)
+      for (size_t k = 0; k < width; ++k) row[j + k] += weighted * taps[j + k];
+  }
+}
+
+}  // namespace
+
+void Fit::add_products_anywhere(Equations& sums, const Row& taps, size_t count, double weight,
+                                double target) {
+  add_all(sums, taps, count, weight, target);
+}
+#ifdef VOXKIT_AVX2
+VOXKIT_AVX2_CODE void Fit::add_products_avx2(Equations& sums, const Row& taps, size_t count, double weight,
+                                             double target) {
+  add_all(sums, taps, count, weight, target);
+}
+#endif
+
 void Fit::add_page(const FitPage& page, std::vector<Equations>& all) const {
+#ifdef VOXKIT_AVX2
+  const bool vectors = has_avx2();
+#endif
   const Extent e = page.extent;
   const auto decoded = [&](int x, int y, int z) {
     const int cx = std::clamp(x, 0, e.nx - 1), cy = std::clamp(y, 0, e.ny - 1), cz = std::max(z, 0);
@@ -141,11 +172,12 @@ void Fit::add_page(const FitPage& page, std::vector<Equations>& all) const {
         sums.weight += weight;
         if (range == 0) continue;
         const auto count = static_cast<size_t>(taps_of(classes_.parents));
-        for (size_t i = 0; i < count; ++i) {
-          const double weighted = weight * taps[i];
-          sums.targets[i] += weighted * target;
-          for (size_t j = i; j < count; ++j) sums.products[i][j] += weighted * taps[j];
-        }
+#ifdef VOXKIT_AVX2
+        if (vectors)
+          add_products_avx2(sums, taps, count, weight, target);
+        else
+#endif
+          add_products_anywhere(sums, taps, count, weight, target);
       }
 }
 

@@ -34,14 +34,19 @@ class Fit {
   std::array<Weights, most_classes> weights() const;
 
  private:
-  using Row = std::array<double, tap_count>;
+  static constexpr size_t row_width = 32;  ///< whole vectors
+  using Row = std::array<double, row_width>;
   /// In differences from the class's rest tap.
   struct Equations {
-    std::array<Row, tap_count> products{};  ///< of taps i <= j
+    alignas(64) std::array<Row, tap_count> products{};  ///< of taps i <= j; others mean nothing
     Row targets{};
     double weight = 0;
   };
   void add_page(const FitPage& page, std::vector<Equations>& sums) const;
+  /// Adds an equation. Each sum is of its own, so that vectors change nothing.
+  static void add_products_anywhere(Equations& sums, const Row& taps, size_t count, double weight,
+                                    double target);
+  static void add_products_avx2(Equations& sums, const Row& taps, size_t count, double weight, double target);
   Weights solve(const Equations& equations, int voxel_class) const;
 
   Classes classes_;
