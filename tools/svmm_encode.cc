@@ -64,8 +64,10 @@ void declare(CommandLine& line, Options& o) {
       "Of layout packed, in place of a quality: finds the greatest error that leads to so many bits a "
       "voxel, of the whole file",
       number(o.target_bpv, 0.001, 1000));
-  line.option("--levels", "on|off", "Of layout packed: coarser levels, for views from afar (on)",
-              one_of(o.levels, {"on", "off"}));
+  line.option(
+      "--levels", "on|off",
+      "Of layout packed: coarser levels, for views from afar; colours and 8 bits within 2 of means (on)",
+      one_of(o.levels, {"on", "off"}));
   line.option("--page", "N",
               "Of layout packed: voxels along a page's side, 16, or 8 for quicker single voxels (16)",
               one_of(o.page, {"16", "8"}));

@@ -46,6 +46,7 @@ bool MaskVoidSearch::is_void(int h, uint32_t index, const Corner& corner) {
 }
 
 bool MaskGrid::fits(const svmm::PackedVolume& volume) {
+  if (volume.finest() > 0) return false;
   return volume.info().format == VoxelFormat::rgb24 ||
          (volume.info().format == VoxelFormat::rgba32 && volume.params().opaque);
 }

@@ -105,7 +105,7 @@ class MaskVoidSearch {
 /// A packed volume of colours, drawn from its file.
 class MaskGrid {
  public:
-  /// Whether rays can go through masks: solid voxels are opaque.
+  /// Whether rays can go through masks: level 0 is there, and solid voxels of it are opaque.
   static bool fits(const svmm::PackedVolume& volume);
   /// Decodes the masks of a volume that fits. Errors: ErrorCode::input, limit.
   static Result<MaskGrid> open(std::shared_ptr<const svmm::PackedVolume> volume, Context& ctx);

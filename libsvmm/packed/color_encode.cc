@@ -163,15 +163,28 @@ class ColorEncoder {
   }
 
   /// Whether R and B take fewer bytes as differences from G: mostly they do, but not where each goes its own
-  /// way, as in a colour cube.
+  /// way, as in a colour cube. And whether a bound saves any: few colours may take fewer bytes as they are.
   Status choose_channels() {
-    std::array<uint64_t, 2> bytes{};
-    for (const bool differences : {false, true}) {
-      params_.channels.differences = differences;
-      VOX_TRY(const ColorModel model, fit(0, pages_to_choose_by));
-      VOX_TRY(bytes[differences], sampled_bytes(0, model, pages_to_choose_by));
+    const uint32_t asked = bound_;
+    std::optional<uint64_t> least;
+    bool best_differences = true;
+    uint32_t best_bound = asked;
+    for (const uint32_t bound : {asked, 0u}) {
+      for (const bool differences : {true, false}) {
+        bound_ = bound;
+        params_.channels.differences = differences;
+        VOX_TRY(const ColorModel model, fit(0, pages_to_choose_by));
+        VOX_TRY(const uint64_t bytes, sampled_bytes(0, model, pages_to_choose_by));
+        if (least && bytes >= *least) continue;
+        least = bytes;
+        best_differences = differences;
+        best_bound = bound;
+      }
+      if (asked == 0) break;
     }
-    params_.channels.differences = bytes[1] <= bytes[0];
+    bound_ = best_bound;
+    params_.channels.differences = best_differences;
+    if (bound_ == 0) params_.max_error = 0;
     return {};
   }
 
@@ -352,7 +365,7 @@ class ColorEncoder {
   VolumeSource& source_;
   const VolumeInfo info_;
   Context& ctx_;
-  const uint32_t bound_;  ///< of R, G and B of level 0
+  uint32_t bound_;  ///< of R, G and B of level 0
   PackedParams params_;
   ColorSurvey survey_;
   std::vector<std::unique_ptr<VolumeSource>> coarser_;

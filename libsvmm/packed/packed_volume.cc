@@ -378,6 +378,7 @@ Status PackedVolume::visit_masks(const std::function<Status(Index3 lo, const pag
                                  Context& ctx) const {
   if (!is_color(info_.format))
     return bad_usage(fmt::format("masks of {} voxels: expected colours", name(info_.format)));
+  if (finest_ > 0) return bad_usage("masks of a file that was cut: expected level 0");
   return svmm::visit_masks(*container_, *pages_, take, ctx);
 }
 

@@ -37,7 +37,8 @@ class Losses {
 /// A level of a file as a source, page by page: where one is damaged, or one of a coarser level that it is
 /// predicted from, voxels are the fill value (NaN in FLOAT32, as formats/fill.h has it), or, without one, the
 /// sample 0. A page may be sound though the checksum of its part is wrong, and decodes then as a rule, where
-/// a damaged one as a rule does not: it is kept, and called doubtful. `losses` hears of the pages that are
+/// a damaged one as a rule does not: it is kept, and called doubtful. Of colours all pages of such a part are
+/// lost. `losses` hears of the pages that are
 /// read, and of those that they are predicted from. Errors: as of open_source, none for damage.
 Result<std::unique_ptr<VolumeSource>> open_salvaged(std::shared_ptr<const PackedVolume> volume, int level,
                                                     std::shared_ptr<Losses> losses);

@@ -209,6 +209,30 @@ TEST(MaskGrid, WhatIsNotOpaqueAfterAllIsDamage) {
   EXPECT_NE(status.error().what.find("byte 3"), std::string::npos);
 }
 
+TEST(MaskGrid, WhatWasCutDoesNotFit) {
+  Fixture f;
+  const VolumeInfo info = info_of({20, 20, 20}, VoxelFormat::rgba32);
+  test::MemorySource source(info, voxels_of(2, info.dims, 4));
+  const auto cut = std::make_shared<std::vector<std::byte>>();
+  ASSERT_TRUE(svmm::encode_packed(
+      source, {},
+      [&](std::span<const std::byte> part) -> Status {
+        cut->insert(cut->end(), part.begin(), part.end());
+        return {};
+      },
+      f.ctx));
+  const auto whole = compressed(source, {}, f.ctx);
+  ASSERT_TRUE(whole);
+  cut->resize((*whole)->levels()[1].end);
+  const auto container = Container::open(*cut, "file", cut);
+  ASSERT_TRUE(container) << container.error().what;
+  const auto volume = svmm::PackedVolume::open(*container, f.memory);
+  ASSERT_TRUE(volume) << volume.error().what;
+  EXPECT_EQ((*volume)->finest(), 1);
+  EXPECT_FALSE(MaskGrid::fits(**volume));
+  EXPECT_EQ(MaskGrid::open(*volume, f.ctx).error().code, ErrorCode::usage);
+}
+
 TEST(MaskGrid, WhatIsTranslucentDoesNotFit) {
   Fixture f;
   const VolumeInfo info = info_of({8, 8, 8}, VoxelFormat::rgba32);
