@@ -317,7 +317,10 @@ class ColorEncoder {
     const PageGrid pages = grid(level);
     const size_t channels = params_.channels.count;
     auto decoded = std::make_unique<DecodedColors>(level, pages);
-    const auto batch_parts = static_cast<uint64_t>(2 * ctx_.threads);
+    const auto batch_parts = static_cast<uint64_t>(ctx_.threads);
+    const uint64_t most_kept = level == 0 ? 0 : std::min(batch_parts * pages.pages_a_part(), pages.pages());
+    VOX_TRY(const Reservation memory,
+            Reservation::take(most_kept * sizeof(ColorPage), "decoded pages of a level", ctx_));
     for (uint64_t part = 0; part < pages.parts(); part += batch_parts) {
       const uint64_t end_part = std::min(part + batch_parts, pages.parts()),
                      first = part * pages.pages_a_part(),
