@@ -144,7 +144,9 @@ std::shared_ptr<const PageCache::Page> solid_page(const ColorPage& page, Channel
 Result<Voxel> sample_color(const Container& container, const PackedPages& pages, const PackedParams& params,
                            Index3 voxel, int level, Ancestors& last) {
   const PageGrid& grid = pages.levels[static_cast<size_t>(level)].grid;
-  const uint64_t number = grid.number(voxel / grid.side);
+  // Without a division: voxels are asked for one by one.
+  const int log2_side = std::countr_zero(static_cast<uint64_t>(grid.side));
+  const uint64_t number = grid.number({voxel.x >> log2_side, voxel.y >> log2_side, voxel.z >> log2_side});
   const PageCache::Key key{~level, number};  // beside ColorPage, which parents are kept as
   auto& [last_key, kept] = last.solid;
   if (!kept || last_key != key) {
@@ -159,7 +161,8 @@ Result<Voxel> sample_color(const Container& container, const PackedPages& pages,
     kept = std::move(found);
   }
   const auto& page = *reinterpret_cast<const SolidPage*>(kept->data());
-  const Index3 at = voxel % grid.side;
+  const int64_t within = grid.side - 1;
+  const Index3 at(voxel.x & within, voxel.y & within, voxel.z & within);
   const uint32_t row = page.mask.row(static_cast<int>(at.y), static_cast<int>(at.z));
   Voxel out{};
   if ((row >> at.x & 1) == 0) return out;
