@@ -48,6 +48,7 @@ KINDS = {
     "svmm packed": (["svmm-encode", "membrane:40,30,20:1", "--layout", "packed", "-q", "100"], "a.svmm", PACKED + [DVR]),
     "svmm bounded": (["svmm-encode", "membrane:40,30,20:1", "--layout", "packed", "--max-error", "3", "--page", "8"],
                      "a.svmm", PACKED + [DVR]),
+    "svmm colors": (["svmm-encode", "menger:3", "--layout", "packed", "-q", "100"], "a.svmm", PACKED),
     "vqv": (["vq-encode", "membrane:40,30,20:1"], "a.vqv", PACKED + [DVR]),
     "vqv means": (["vq-encode", "membrane:40,30,20:1", "-k", "40"], "a.vqv", PACKED + [DVR]),
     "vqv zstd": (["vq-encode", "membrane:40,30,20:1", "--zstd", "3"], "a.vqv", PACKED + [DVR]),
