@@ -24,7 +24,9 @@ class SalvagedSource final : public VolumeSource {
       : volume_(std::move(volume)), level_(level), losses_(std::move(losses)) {
     info_ = info;
     const double sample_0 = info.stored(0), nothing = info.fill.value_or(sample_0);
-    if (info.format == VoxelFormat::float32)
+    if (is_color(info.format))
+      void_ = Voxel{};
+    else if (info.format == VoxelFormat::float32)
       void_ = Voxel::of(info.fill ? std::numeric_limits<float>::quiet_NaN() : 0.0f);
     else if (info.format == VoxelFormat::density16)
       void_ = Voxel::of(static_cast<uint16_t>(std::clamp(nothing, 0.0, 65535.0)));
@@ -51,44 +53,42 @@ class SalvagedSource final : public VolumeSource {
   }
 
  private:
-  /// Of colours each page comes back as a whole, or is lost: a part whose checksum is wrong as well.
-  void read_colors(const Box& box, VoxelSpan out) {
-    const PageGrid& grid = volume_->pages().levels[static_cast<size_t>(level_)].grid;
-    const Index3 first = box.lo / grid.side, last = (box.hi + (grid.side - 1)) / grid.side;
-    for (int64_t z = first.z; z < last.z; ++z)
-      for (int64_t y = first.y; y < last.y; ++y)
-        for (int64_t x = first.x; x < last.x; ++x) {
-          const uint64_t number = grid.number({x, y, z});
-          const Box part = intersect(grid.box(number), box);
-          const Index3 at = part.lo - box.lo;
-          const VoxelSpan to{out.row(at.y, at.z) + at.x * voxel_bytes(info_.format), out.row_stride,
-                             out.slice_stride};
-          if (volume_->decode(part, level_, to)) continue;
-          note(level_, number, false);
-          fill(to, part.size(), info_.format, Voxel{});
-        }
-  }
   using Codes = std::shared_ptr<const PageCache::Page>;
 
-  template <class T>
-  void read_as(const Box& box, VoxelSpan out) {
+  /// Calls decode(number, page, part, voxels) for each page of which a part is in the box; where that is
+  /// false, the part is void.
+  template <class Decode>
+  void each_page(const Box& box, VoxelSpan out, const Decode& decode) {
     const PageGrid& grid = volume_->pages().levels[static_cast<size_t>(level_)].grid;
     const Index3 first = box.lo / grid.side, last = (box.hi + (grid.side - 1)) / grid.side;
     for (int64_t z = first.z; z < last.z; ++z)
       for (int64_t y = first.y; y < last.y; ++y)
         for (int64_t x = first.x; x < last.x; ++x) {
           const uint64_t number = grid.number({x, y, z});
-          const Box page = grid.box(number);
-          if (const Codes codes = codes_of<T>(level_, number)) {
-            place(reinterpret_cast<const T*>(codes->data()), page, box, volume_->params().map, info_.format,
-                  out);
-          } else {
-            const Box part = intersect(page, box);
-            const Index3 at = part.lo - box.lo;
-            fill({out.row(at.y, at.z) + at.x * voxel_bytes(info_.format), out.row_stride, out.slice_stride},
-                 part.size(), info_.format, void_);
-          }
+          const Box page = grid.box(number), part = intersect(page, box);
+          const Index3 at = part.lo - box.lo;
+          const VoxelSpan voxels{out.row(at.y, at.z) + at.x * voxel_bytes(info_.format), out.row_stride,
+                                 out.slice_stride};
+          if (!decode(number, page, part, voxels)) fill(voxels, part.size(), info_.format, void_);
         }
+  }
+  /// Of colours each page comes back as a whole, or is lost: a part whose checksum is wrong as well.
+  void read_colors(const Box& box, VoxelSpan out) {
+    each_page(box, out, [&](uint64_t number, const Box&, const Box& part, VoxelSpan voxels) {
+      if (volume_->decode(part, level_, voxels)) return true;
+      note(level_, number, false);
+      return false;
+    });
+  }
+  template <class T>
+  void read_as(const Box& box, VoxelSpan out) {
+    each_page(box, out, [&](uint64_t number, const Box& page, const Box& part, VoxelSpan voxels) {
+      const Codes codes = codes_of<T>(level_, number);
+      if (codes)
+        place(reinterpret_cast<const T*>(codes->data()), page, part, volume_->params().map, info_.format,
+              voxels);
+      return codes != nullptr;
+    });
   }
 
   /// The codes of a page; null where it is lost.
