@@ -33,8 +33,9 @@ class Fit {
   /// The weights of least squared error for each class.
   std::array<Weights, most_classes> weights() const;
 
- private:
   static constexpr size_t row_width = 32;  ///< whole vectors
+
+ private:
   using Row = std::array<double, row_width>;
   /// In differences from the class's rest tap.
   struct Equations {
@@ -42,17 +43,28 @@ class Fit {
     Row targets{};
     double weight = 0;
   };
-  void add_page(const FitPage& page, std::vector<Equations>& sums) const;
-  /// Adds an equation. Each sum is of its own, so that vectors change nothing.
-  static void add_products_anywhere(Equations& sums, const Row& taps, size_t count, double weight,
-                                    double target);
-  static void add_products_avx2(Equations& sums, const Row& taps, size_t count, double weight, double target);
+  struct Batch;
+  /// The tap that others are given as differences from, -1: none; and of each tap all bits if there is one.
+  struct ClassTaps {
+    int rest = -1;
+    std::array<int32_t, row_width> mask{};
+  };
+  void add_page(const FitPage& page, int share, int turn, std::vector<Equations>& sums,
+                std::vector<Batch>& batches) const;
+  // Each sum is of its own, so that vectors change nothing.
+  void add_pages(std::span<const FitPage> pages, std::vector<Equations>& sums,
+                 std::vector<Batch>& batches) const;
+  void add_pages_anywhere(std::span<const FitPage> pages, std::vector<Equations>& sums,
+                          std::vector<Batch>& batches) const;
+  void add_pages_avx2(std::span<const FitPage> pages, std::vector<Equations>& sums,
+                      std::vector<Batch>& batches) const;
   Weights solve(const Equations& equations, int voxel_class) const;
 
   Classes classes_;
   int shift_;     ///< of samples
   double quiet_;  ///< the squared range of taps at which an equation counts half
   std::vector<Equations> equations_;
+  std::array<ClassTaps, most_classes> class_taps_;
 };
 
 }  // namespace voxkit::page

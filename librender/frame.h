@@ -30,10 +30,10 @@ struct FrameCounts {
   uint64_t blocks_touched = 0;  ///< times that a block was entered, or a brick decoded
   uint64_t bytes_touched = 0;   ///< of links and values looked at
   uint64_t samples = 0;         ///< dvr: taken
-  uint64_t bricks_decoded =
-      0;               ///< dvr: places of bricks that were decoded, each counted once; packed colours: pages
-  double seconds = 0;  ///< of casting alone
-  double lookup_seconds = 0;  ///< of that, for colours that were looked up afterwards
+  uint64_t bricks_decoded = 0;  ///< dvr: places of bricks that were decoded, each counted once
+  uint64_t pages_decoded = 0;   ///< of packed volumes; not those that were kept from before
+  double seconds = 0;           ///< of casting alone
+  double lookup_seconds = 0;    ///< of that, for colours that were looked up afterwards
 };
 
 /// The pixels of a picture before shading, row by row from the top, and what they cost. Its memory serves one

@@ -28,6 +28,10 @@ Result<std::shared_ptr<const DvrVolume>> open_volume(Input& input, bool device, 
       return DvrVolume::open(input.svmm, run.ctx);
     }
     if (input.vq) return DvrVolume::open(input.vq, run.ctx);
+    if (input.packed && !device) {
+      run.stage("measure");
+      return DvrVolume::open(input.packed, run.ctx);
+    }
     run.stage("read");
     VOX_TRY(auto grid, DenseGrid::read(*input.source, run.ctx));
     return DvrVolume::open(std::move(grid), run.ctx);
@@ -61,6 +65,7 @@ Status Scene::draw(const Camera& camera, CastOptions options, const DvrOptions& 
   if (device) return device->cast(camera, options, frame, ctx);
   if (dag) return cast(*dag, camera, options, frame, ctx);
   if (masks) return cast(*masks, camera, options, frame, ctx);
+  if (packed) return cast(*packed, camera, options, frame, ctx);
   return compressed ? cast(*compressed, camera, options, frame, ctx)
                     : cast(*dense, camera, options, frame, ctx);
 }
@@ -90,9 +95,11 @@ Result<Scene> open_scene(const std::string& name, const SceneOptions& o, Run& ru
     scene.compressed.emplace(input.svmm);
   } else if (input.color) {
     scene.dag.emplace(input.color);
-  } else if (input.packed && !o.backend && render::MaskGrid::fits(*input.packed)) {
+  } else if (input.packed && !o.backend && !o.level_of_detail && render::MaskGrid::fits(*input.packed)) {
     run.stage("read");
     VOX_TRY(scene.masks, render::MaskGrid::open(input.packed, run.ctx));
+  } else if (input.packed && !o.backend) {
+    scene.packed.emplace(input.packed);
   } else {
     run.stage("read");
     VOX_TRY(scene.dense, DenseGrid::read(*input.source, run.ctx));

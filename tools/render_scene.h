@@ -18,16 +18,18 @@ struct SceneOptions {
   OpenOptions open;
   std::optional<ValueRange> range;  ///< sample values
   bool dvr = false;
+  bool level_of_detail = false;                    ///< as CastOptions
   std::shared_ptr<const render::Backend> backend;  ///< that draws; null: this machine, its own way
 };
 
 /// A volume that is ready to be drawn.
 struct Scene {
   VolumeInfo info;
-  // Surfaces: one of the first four; some on the GPU.
+  // Surfaces: one of the first five; some on the GPU.
   std::optional<render::SvmmGrid> compressed;
   std::optional<render::DagGrid> dag;
   std::optional<render::MaskGrid> masks;
+  std::optional<render::PackedGrid> packed;
   std::shared_ptr<const render::DenseGrid> dense;
   std::unique_ptr<const render::DeviceGrid> device;
   ValueRange range{0, 255};  ///< stored values

@@ -20,14 +20,27 @@ namespace {
 struct Options {
   std::string input, output;
   OpenOptions open;
-  std::vector<int64_t> blockwidths = {0};
-  int64_t rootwidth = 32;
   std::optional<double> quality, delta;
-  std::string base = "raw", layout = "plain", bound, alpha_weight, levels = "on", page = "16";
+  std::string layout;
+  // Of layouts plain and thesis.
+  std::vector<int64_t> blockwidths;
+  std::optional<int64_t> rootwidth;
+  std::string base, bound, alpha_weight;
+  // Of layout packed.
+  std::string levels, page;
   std::optional<double> max_error, target_psnr, target_bpv;
   std::optional<ValueRange> range;
   int zstd = 0;
   bool verify = false;
+
+  bool has_blocks_option() const {
+    return !blockwidths.empty() || rootwidth || !base.empty() || !bound.empty() || !alpha_weight.empty() ||
+           zstd != 0;
+  }
+  bool has_pages_option() const {
+    return max_error || target_psnr || target_bpv || !levels.empty() || !page.empty();
+  }
+  bool is_packed() const { return layout == "packed" || (layout.empty() && !has_blocks_option()); }
 };
 
 void declare(CommandLine& line, Options& o) {
@@ -43,15 +56,16 @@ void declare(CommandLine& line, Options& o) {
               });
   line.option("-r,--rootwidth", "R", "The level with no side above R is the root (32)",
               integer(o.rootwidth, 1, max_side));
-  line.option("-q,--quality", "Q", "0 to 100; 100 is lossless (90). In this tool -q is not --quiet",
+  line.option("-q,--quality", "Q",
+              "0 to 100; 100 is lossless (90, of labels 100). In this tool -q is not --quiet",
               number(o.quality, 0, 100));
   line.option("--delta", "D", "In place of a quality: distance allowed, as a fraction of full scale",
               number(o.delta, 0, 1e9));
   line.option("-b,--base", "BASE", "Base level: raw bitmap alpha gray bc1 (raw)",
               one_of(o.base, {"raw", "bitmap", "alpha", "gray", "bc1"}));
   line.option("--layout", "LAYOUT",
-              "plain; thesis: the published bits, sizes and stop rule; packed: entropy-coded pages, the "
-              "smallest (plain)",
+              "packed: entropy-coded pages, the smallest; plain: blocks, the fastest to look up; thesis: the "
+              "published bits, sizes and stop rule (packed, or plain with an option of blocks)",
               one_of(o.layout, {"plain", "thesis", "packed"}));
   line.option("--max-error", "E",
               "Of layout packed, in place of a quality: greatest error, in units of samples",
@@ -87,24 +101,29 @@ void declare(CommandLine& line, Options& o) {
   declare_input_options(line, o.open);
 }
 
+/// What is asked for, or else 90, or 100 where voxels cannot be off.
+double quality_of(const Options& o, const VolumeInfo& info) {
+  return o.quality.value_or(svmm::may_be_off(info) ? 90 : 100);
+}
+
 /// Everything but full_scale, which may need the voxels.
-Result<svmm::Params> params_of(const Options& o, VoxelFormat format) {
+Result<svmm::Params> params_of(const Options& o, const VolumeInfo& info) {
   using namespace svmm;
   Params params;
   params.layout = o.layout == "thesis" ? Layout::thesis : Layout::plain;
   for (const Base base : {Base::raw, Base::bitmap, Base::alpha, Base::gray, Base::bc1})
-    if (name(base) == o.base) params.base = base;
+    if (name(base) == (o.base.empty() ? "raw" : o.base)) params.base = base;
   const bool thesis = params.layout == Layout::thesis;
   params.bound = o.bound == "local" || (o.bound.empty() && thesis) ? Bound::local : Bound::global;
   params.alpha_weight = o.alpha_weight == "on" || (o.alpha_weight.empty() && !thesis);
   if (o.blockwidths != std::vector<int64_t>{0}) {
     for (const int64_t w : o.blockwidths) params.blockwidths.push_back(static_cast<int>(w));
   }
-  params.rootwidth = o.rootwidth;
+  params.rootwidth = o.rootwidth.value_or(32);
   params.zstd = o.zstd;
   if (o.quality && o.delta) return bad_usage("--quality and --delta: expected one of them");
-  params.quality = o.delta ? -1 : o.quality.value_or(90);
-  params.delta = o.delta ? *o.delta : delta_of_quality(params.quality, format, params.layout);
+  params.quality = o.delta ? -1 : quality_of(o, info);
+  params.delta = o.delta ? *o.delta : delta_of_quality(params.quality, info.format, params.layout);
   return params;
 }
 
@@ -172,14 +191,15 @@ Result<double> scale_of(const Options& o, bool lossless, std::unique_ptr<VolumeS
 }
 
 Status check_packed(const Options& o) {
-  if (o.blockwidths != std::vector<int64_t>{0} || o.rootwidth != 32 || o.base != "raw" || !o.bound.empty() ||
-      !o.alpha_weight.empty() || o.zstd != 0)
+  if (o.has_blocks_option())
     return bad_usage(
         "--blockwidth, --rootwidth, --base, --bound, --alpha-weight, --zstd: not of --layout packed");
   if (o.quality.has_value() + o.delta.has_value() + o.max_error.has_value() + o.target_psnr.has_value() +
           o.target_bpv.has_value() >
       1)
     return bad_usage("--quality, --delta, --max-error, --target-psnr and --target-bpv: expected one of them");
+  if (o.range && (o.max_error || target_of(o)))
+    return bad_usage("--range: of --quality and --delta, which are fractions of it");
   return {};
 }
 
@@ -189,9 +209,9 @@ Result<int> work_packed(const Options& o, Inputs& inputs, Run& run) {
   const VoxelFormat format = source->info().format;
   svmm::PackedOptions options;
   options.page_side = o.page == "8" ? 8 : 16;
-  options.levels = o.levels == "on";
+  options.levels = o.levels != "off";
   const double delta =
-      o.delta ? *o.delta : svmm::delta_of_quality(o.quality.value_or(90), format, svmm::Layout::plain);
+      o.delta ? *o.delta : svmm::delta_of_quality(quality_of(o, source->info()), format, svmm::Layout::plain);
   options.target = target_of(o);
   const bool lossless = o.max_error ? *o.max_error == 0 : delta == 0 && !options.target;
   VOX_TRY(const double scale, scale_of(o, lossless, source, inputs, run));
@@ -217,12 +237,14 @@ Result<int> work_packed(const Options& o, Inputs& inputs, Run& run) {
     VOX_TRY(const bool held, holds(source, inputs, *out, o, params.max_error, kept, encoding, run));
     if (!held) return 1;
   }
-  VOX_CHECK(out->commit());
+  Json json = encoding_json(encoding, run, params_json(params));
   if (run.options.json) {
-    Json json = encoding_json(encoding, run, params_json(params));
+    VOX_TRY(const Input written, open_compressed(out->temporary(), 0, run.ctx));
+    json.set("levels", levels_json(*written.packed));
     add_verified(encoding, json);
-    VOX_CHECK(print(json.text()));
   }
+  VOX_CHECK(out->commit());
+  if (run.options.json) VOX_CHECK(print(json.text()));
   if (!run.options.quiet && !run.options.json) print_encoding(encoding);
   return 0;
 }
@@ -232,19 +254,22 @@ Result<int> work(const Options& o, Run& run) {
   OpenOptions open = o.open;
   open.outputs = {o.output};
   Inputs inputs(o.input, open, run.ctx);
-  if (o.layout == "packed") return work_packed(o, inputs, run);
-  if (o.max_error || target_of(o) || o.levels != "on" || o.page != "16")
-    return bad_usage("--max-error, --target-psnr, --target-bpv, --levels, --page: of --layout packed only");
-  const bool lossless = o.delta ? *o.delta == 0 : o.quality.value_or(90) == 100;
-  VOX_TRY(auto source, inputs.open(o.verify || (!lossless && !o.range)));
-  VOX_TRY(svmm::Params params, params_of(o, source->info().format));
+  if (o.is_packed()) return work_packed(o, inputs, run);
+  if (o.has_pages_option())
+    return bad_usage(fmt::format(
+        "--max-error, --target-psnr, --target-bpv, --levels, --page: of --layout packed only{}",
+        o.layout.empty() ? ", which has no --blockwidth, --rootwidth, --base, --bound, --alpha-weight, --zstd"
+                         : ""));
+  VOX_TRY(auto source,
+          inputs.open(o.verify || (o.delta.value_or(100 - o.quality.value_or(90)) > 0 && !o.range)));
+  VOX_TRY(svmm::Params params, params_of(o, source->info()));
   VOX_CHECK(svmm::validate(params, source->info()));
   const VoxelFormat format = source->info().format;
   if (o.range && format != VoxelFormat::density16 && format != VoxelFormat::float32)
     return bad_usage(
         fmt::format("--range: {} voxels{} have a full scale of their own: expected 16 bit or float voxels",
                     type_name(source->info()), source->info().has_wide_base() ? ", held in 8 bits," : ""));
-  VOX_TRY(params.full_scale, scale_of(o, lossless, source, inputs, run));
+  VOX_TRY(params.full_scale, scale_of(o, params.delta == 0, source, inputs, run));
   const VolumeInfo info = source->info();
 
   VOX_TRY(auto out, OutputFile::create(o.output, run.options.force));
@@ -278,8 +303,8 @@ int main(int argc, char** argv) {
       argc, argv, "svmm-encode", "Compresses a volume as sparse voxel mip-maps.",
       "  svmm-encode head.nii.gz -o head.svmm\n"
       "  svmm-encode head.nii.gz -o head.svmm --quality 100 --verify\n"
-      "  svmm-encode head.nii.gz -o head.svmm --layout packed --target-psnr 45\n"
+      "  svmm-encode head.nii.gz -o head.svmm --target-psnr 45\n"
       "  svmm-encode menger:6 -o menger.svmm --blockwidth 4 --base bitmap --quality 80\n"
-      "  svmm-encode scan.raw --dims 512,512,361 --type u16 -o - --quality 95 > scan.svmm\n",
+      "  svmm-encode scan.raw --dims 512,512,361 --type u16 -o - --max-error 2 > scan.svmm\n",
       [&](CommandLine& line) { declare(line, options); }, [&](Run& run) { return work(options, run); });
 }

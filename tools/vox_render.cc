@@ -59,7 +59,9 @@ struct Costs {
         .set("rays_hit", frame.rays_hit)
         .set("samples", frame.samples);
     json.set("cells_visited", frame.cells_visited).set("blocks_touched", frame.blocks_touched);
-    json.set("bytes_touched", frame.bytes_touched).set("bricks_decoded", frame.bricks_decoded);
+    json.set("bytes_touched", frame.bytes_touched)
+        .set("bricks_decoded", frame.bricks_decoded)
+        .set("pages_decoded", frame.pages_decoded);
     if (frame.lookup_seconds > 0) json.set("lookup_ms", frame.lookup_seconds * 1000);
     frames.push(std::move(json));
   }
@@ -155,6 +157,7 @@ FrameOptions options_of(const RenderOptions& o, const Plan& plan) {
   options.scene.open.outputs = plan.names;
   if (!o.report.empty()) options.scene.open.outputs.push_back(o.report);
   options.scene.dvr = o.mode == "dvr";
+  options.scene.level_of_detail = options.cast.level_of_detail;
   options.scene.backend = plan.backend;
   options.shade.phong = phong && !options.scene.dvr;  // there every sample is lit by itself
   options.shade.ssao = o.shade.find("ssao") != std::string::npos;

@@ -17,7 +17,7 @@ Status look_up(const svmm::PackedVolume& volume, Frame& frame, Context& ctx) {
   constexpr int64_t side = 32;  // of tiles: neighbours are mostly in one page
   const int64_t across = (frame.width + side - 1) / side, down = (frame.height + side - 1) / side;
   VOX_CHECK(parallel_for(ctx, across * down, [&](int64_t tile) -> Status {
-    svmm::PackedVolume::Reader reader(volume);
+    svmm::PackedVolume::Reader reader(volume, 0);
     const int64_t x0 = tile % across * side, y0 = tile / across * side;
     for (int64_t y = y0; y < std::min<int64_t>(y0 + side, frame.height); ++y)
       for (int64_t x = x0; x < std::min<int64_t>(x0 + side, frame.width); ++x) {
@@ -60,7 +60,7 @@ Status cast(const MaskGrid& grid, const Camera& camera, const CastOptions& optio
   }
   const uint64_t decoded = grid.volume().pages_decoded();
   VOX_CHECK(look_up(grid.volume(), frame, ctx));
-  frame.bricks_decoded = grid.volume().pages_decoded() - decoded;
+  frame.pages_decoded = grid.volume().pages_decoded() - decoded;
   if (!options.details) frame.details.clear();
   return {};
 }

@@ -6,6 +6,7 @@
 #include "librender/cast/dag_grid.h"
 #include "librender/cast/grid.h"
 #include "librender/cast/mask_grid.h"
+#include "librender/cast/packed_grid.h"
 #include "librender/frame.h"
 
 namespace voxkit::render {
@@ -37,6 +38,8 @@ Status cast(const DagGrid& grid, const Camera& camera, const CastOptions& option
             Context& ctx);
 /// Without levels of detail.
 Status cast(const MaskGrid& grid, const Camera& camera, const CastOptions& options, Frame& frame,
+            Context& ctx);
+Status cast(const PackedGrid& grid, const Camera& camera, const CastOptions& options, Frame& frame,
             Context& ctx);
 
 }  // namespace voxkit::render

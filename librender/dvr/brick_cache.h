@@ -11,6 +11,7 @@
 #include "librender/cast/grid.h"
 #include "librender/dvr/dvr_lanes.h"
 #include "librender/dvr/transfer.h"
+#include "libsvmm/packed/packed.h"
 #include "libsvmm/svmm.h"
 #include "libvq/vq.h"
 
@@ -28,7 +29,7 @@ class BrickReader {
  public:
   virtual ~BrickReader() = default;
   /// The values of the brick at a place, each clamped to the volume's edges. Where a file is damaged they
-  /// mean nothing, and the volume's store has the error.
+  /// mean nothing, and `status` or the volume's store has the error.
   virtual void read(uint32_t x, uint32_t y, uint32_t z, T* values) = 0;
   /// Forgets what it remembers.
   virtual void forget() {}
@@ -36,6 +37,8 @@ class BrickReader {
   uint64_t decoded() const { return decoded_; }
   /// Which bricks were, a bit each, x fastest.
   const std::vector<uint64_t>& places() const { return places_; }
+  /// The first error, of files without a store.
+  const Status& status() const { return status_; }
 
  protected:
   /// `bricks`: of the volume.
@@ -48,9 +51,13 @@ class BrickReader {
     places_[place / 64] |= uint64_t{1} << place % 64;
     ++decoded_;
   }
+  void fail(Error error) {
+    if (status_) status_ = tl::unexpected<Error>(std::move(error));
+  }
 
  private:
   Index3 bricks_;
+  Status status_;
   uint64_t decoded_ = 0;
   std::vector<uint64_t> places_;
 };
@@ -65,6 +72,10 @@ std::unique_ptr<BrickReader<T>> brick_reader(std::shared_ptr<const svmm::Volume>
 template <class T>
 std::unique_ptr<BrickReader<T>> brick_reader(std::shared_ptr<const vq::Volume> volume,
                                              const TransferFunction* shown);
+/// Of scalars, from pages. `info`: of the finest level that is there. (packed_brick_reader.cc)
+template <class T>
+std::unique_ptr<BrickReader<T>> brick_reader(std::shared_ptr<const svmm::PackedVolume> volume,
+                                             const VolumeInfo& info);
 
 inline Index3 bricks_of(const VolumeInfo& info) {
   return (info.dims + Index3(vq::brick_edge - 1)) / Index3(vq::brick_edge);

@@ -82,31 +82,54 @@ Result<BrickRanges> BrickRanges::create(const VolumeInfo& info, Context& ctx) {
   return ranges;
 }
 
-/// `read(z0, z1, buffer)` has the slices z0 .. z1 - 1 of the volume; what it had to make is in the buffer.
+/// `read(z0, z1, buffer)` has the slices z0 .. z1 - 1 of the volume, of `layers` bricks and one more; what it
+/// had to make is in the buffer.
 template <class Read>
-Status BrickRanges::measure(const VolumeInfo& info, const Read& read, Context& ctx) {
+Status BrickRanges::measure(const VolumeInfo& info, int64_t layers, const Read& read, Context& ctx) {
   std::mutex mutex;
   int64_t done = 0;
-  return parallel_for(ctx, bricks_.z, [&](int64_t z) -> Status {
-    const int64_t z0 = z * dvr_brick, z1 = std::min(z0 + dvr_brick + 1, info.dims.z);
+  return parallel_for(ctx, (bricks_.z + layers - 1) / layers, [&](int64_t i) -> Status {
+    const int64_t first = i * layers, end = std::min(first + layers, bricks_.z), z0 = first * dvr_brick;
     std::unique_ptr<Buffer> buffer;
-    VOX_TRY(const ConstVoxelSpan voxels, read(z0, z1, buffer));
-    Range* const out = ranges_ + z * bricks_.y * bricks_.x;
-    switch (voxel_bytes(info.format)) {
-      case 1:
-        measure_slice<uint8_t>(info, voxels, z1 - z0, bricks_, out);
-        break;
-      case 2:
-        measure_slice<uint16_t>(info, voxels, z1 - z0, bricks_, out);
-        break;
-      default:
-        measure_slice<float>(info, voxels, z1 - z0, bricks_, out);
+    VOX_TRY(const ConstVoxelSpan voxels, read(z0, std::min(end * dvr_brick + 1, info.dims.z), buffer));
+    for (int64_t z = first; z < end; ++z) {
+      const int64_t from = z * dvr_brick, depth = std::min(from + dvr_brick + 1, info.dims.z) - from;
+      const ConstVoxelSpan slices{voxels.row(0, from - z0), voxels.row_stride, voxels.slice_stride};
+      Range* const out = ranges_ + z * bricks_.y * bricks_.x;
+      switch (voxel_bytes(info.format)) {
+        case 1:
+          measure_slice<uint8_t>(info, slices, depth, bricks_, out);
+          break;
+        case 2:
+          measure_slice<uint16_t>(info, slices, depth, bricks_, out);
+          break;
+        default:
+          measure_slice<float>(info, slices, depth, bricks_, out);
+      }
     }
     const std::lock_guard lock(mutex);
-    ctx.progress(static_cast<double>(++done) / static_cast<double>(bricks_.z));
+    ctx.progress(static_cast<double>(done += end - first) / static_cast<double>(bricks_.z));
     return {};
   });
 }
+
+namespace {
+
+/// Slabs for `measure`, decoded with decode(box, out).
+template <class Decode>
+auto decoded_slabs(const VolumeInfo& info, const Decode& decode, Context& ctx) {
+  return [&info, decode, &ctx](int64_t z0, int64_t z1,
+                               std::unique_ptr<Buffer>& buffer) -> Result<ConstVoxelSpan> {
+    const Box box{{0, 0, z0}, {info.dims.x, info.dims.y, z1}};
+    VOX_TRY(buffer, Buffer::allocate(static_cast<uint64_t>(box.voxels() * voxel_bytes(info.format)),
+                                     "a slab of the volume", ctx));
+    const VoxelSpan out = packed(buffer->data(), box.size(), info.format);
+    VOX_CHECK(decode(box, out));
+    return ConstVoxelSpan{out.data, out.row_stride, out.slice_stride};
+  };
+}
+
+}  // namespace
 
 Result<BrickRanges> BrickRanges::of(const DenseGrid& grid, Context& ctx) {
   VOX_TRY(BrickRanges ranges, create(grid.info(), ctx));
@@ -114,22 +137,29 @@ Result<BrickRanges> BrickRanges::of(const DenseGrid& grid, Context& ctx) {
   const auto read = [&](int64_t z0, int64_t, std::unique_ptr<Buffer>&) -> Result<ConstVoxelSpan> {
     return ConstVoxelSpan{all.row(0, z0), all.row_stride, all.slice_stride};
   };
-  VOX_CHECK(ranges.measure(grid.info(), read, ctx));
+  VOX_CHECK(ranges.measure(grid.info(), 1, read, ctx));
   return ranges;
 }
 
 Result<BrickRanges> BrickRanges::of(const svmm::Volume& volume, Context& ctx) {
   const VolumeInfo& info = volume.info();
   VOX_TRY(BrickRanges ranges, create(info, ctx));
-  const auto read = [&](int64_t z0, int64_t z1, std::unique_ptr<Buffer>& buffer) -> Result<ConstVoxelSpan> {
-    const Box box{{0, 0, z0}, {info.dims.x, info.dims.y, z1}};
-    VOX_TRY(buffer, Buffer::allocate(static_cast<uint64_t>(box.voxels() * voxel_bytes(info.format)),
-                                     "a slab of the volume", ctx));
-    const VoxelSpan out = packed(buffer->data(), box.size(), info.format);
-    VOX_CHECK(volume.decode(box, 0, out));
-    return ConstVoxelSpan{out.data, out.row_stride, out.slice_stride};
+  const auto decode = [&](const Box& box, VoxelSpan out) { return volume.decode(box, 0, out); };
+  VOX_CHECK(ranges.measure(info, 1, decoded_slabs(info, decode, ctx), ctx));
+  return ranges;
+}
+
+Result<BrickRanges> BrickRanges::of(const svmm::PackedVolume& volume, Context& ctx) {
+  const VolumeInfo info = volume.info_of(volume.finest());
+  VOX_TRY(BrickRanges ranges, create(info, ctx));
+  const auto decode = [&](const Box& box, VoxelSpan out) -> Status {
+    svmm::PackedVolume::Reader reader(volume,
+                                      volume.finest());  // what the slabs beside it need, too, is kept
+    return reader.read(box, out);
   };
-  VOX_CHECK(ranges.measure(info, read, ctx));
+  // Layers of whole pages.
+  VOX_CHECK(
+      ranges.measure(info, volume.params().page_side / dvr_brick, decoded_slabs(info, decode, ctx), ctx));
   return ranges;
 }
 

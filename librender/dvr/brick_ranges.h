@@ -6,6 +6,7 @@
 
 #include "librender/cast/grid.h"
 #include "librender/dvr/transfer.h"
+#include "libsvmm/packed/packed.h"
 #include "libsvmm/svmm.h"
 #include "libvq/vq.h"
 
@@ -25,6 +26,8 @@ class BrickRanges {
   /// One pass over all voxels.
   static Result<BrickRanges> of(const DenseGrid& grid, Context& ctx);
   static Result<BrickRanges> of(const svmm::Volume& volume, Context& ctx);
+  /// Of scalars, of the finest level that is there.
+  static Result<BrickRanges> of(const svmm::PackedVolume& volume, Context& ctx);
   /// From the records of the bricks, without decoding any. So a range is that of the brick and all of its
   /// neighbours that samples may reach.
   static Result<BrickRanges> of(const vq::Volume& volume, Context& ctx);
@@ -39,7 +42,7 @@ class BrickRanges {
  private:
   static Result<BrickRanges> create(const VolumeInfo& info, Context& ctx);
   template <class Read>
-  Status measure(const VolumeInfo& info, const Read& read, Context& ctx);
+  Status measure(const VolumeInfo& info, int64_t layers, const Read& read, Context& ctx);
   /// From bricks alone to bricks and those next to them.
   Status spread(Context& ctx);
 

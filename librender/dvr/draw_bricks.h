@@ -27,9 +27,10 @@ Status draw_bricks(const DvrVolume& volume, const DvrJob& job, Frame& frame, Con
       }
       VOX_CHECK(memory.add(BrickCache<T>::bytes(volume.ranges().bricks()), "a cache of bricks"));
     }
-    return std::make_unique<BrickCache<T>>(volume.vq()     ? brick_reader<T>(volume.vq(), job.shown)
-                                           : volume.svmm() ? brick_reader<T>(volume.svmm())
-                                                           : brick_reader<T>(volume.dense()));
+    return std::make_unique<BrickCache<T>>(volume.vq()       ? brick_reader<T>(volume.vq(), job.shown)
+                                           : volume.svmm()   ? brick_reader<T>(volume.svmm())
+                                           : volume.packed() ? brick_reader<T>(volume.packed(), volume.info())
+                                                             : brick_reader<T>(volume.dense()));
   };
   VOX_CHECK(over_tiles(job.params, frame, ctx, [&](const DvrTile& tile, DvrCounts& count) -> Status {
     VOX_TRY(auto cache, take());
@@ -37,6 +38,7 @@ Status draw_bricks(const DvrVolume& volume, const DvrJob& job, Frame& frame, Con
     const uint64_t before = cache->reader().decoded();
     Sampler sampler(*cache);
     draw(job.params, sampler, tile, frame, job.details, count);
+    VOX_CHECK(cache->reader().status());
     count.decoded = cache->reader().decoded() - before;
     const std::lock_guard lock(mutex);
     idle.push_back(std::move(cache));

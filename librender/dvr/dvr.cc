@@ -95,6 +95,13 @@ Result<DvrVolume> DvrVolume::open(std::shared_ptr<const vq::Volume> compressed, 
   volume.vq_ = std::move(compressed);
   return volume;
 }
+Result<DvrVolume> DvrVolume::open(std::shared_ptr<const svmm::PackedVolume> compressed, Context& ctx) {
+  VOX_CHECK(check_scalar(compressed->info()));
+  VOX_TRY(BrickRanges ranges, BrickRanges::of(*compressed, ctx));
+  DvrVolume volume(compressed->info_of(compressed->finest()), std::move(ranges));
+  volume.packed_ = std::move(compressed);
+  return volume;
+}
 
 Result<DvrScene> DvrScene::create(std::shared_ptr<const DvrVolume> volume, TransferFunction transfer,
                                   Context& ctx) {
@@ -147,6 +154,7 @@ Result<DvrJob> dvr_job(const DvrScene& scene, const Camera& camera, const DvrOpt
 Status DvrScene::draw(const Camera& camera, const DvrOptions& options, Frame& frame, Context& ctx) const {
   VOX_TRY(const DvrJob job, dvr_job(*this, camera, options));
   VOX_CHECK(frame.begin({.width = options.width, .height = options.height, .details = options.details}, ctx));
+  const uint64_t pages = volume_->packed() ? volume_->packed()->pages_decoded() : 0;
   const auto start = Clock::now();
   VOX_CHECK(blank_around(job, frame, ctx));
   if (volume_->dense() && is_direct(volume_->info())) {
@@ -157,6 +165,7 @@ Status DvrScene::draw(const Camera& camera, const DvrOptions& options, Frame& fr
     VOX_CHECK(draw_bricks<uint16_t>(*volume_, job, frame, ctx));
   }
   frame.seconds = seconds_since(start);
+  if (volume_->packed()) frame.pages_decoded = volume_->packed()->pages_decoded() - pages;
   if (volume_->svmm()) return volume_->svmm()->store().status();
   if (volume_->vq()) return volume_->vq()->store().status();
   return {};

@@ -17,6 +17,8 @@ class DvrVolume {
   static Result<DvrVolume> open(std::shared_ptr<const DenseGrid> grid, Context& ctx);
   static Result<DvrVolume> open(std::shared_ptr<const svmm::Volume> volume, Context& ctx);
   static Result<DvrVolume> open(std::shared_ptr<const vq::Volume> volume, Context& ctx);
+  /// The finest level that is there. Decodes every page once, and again where a picture needs them.
+  static Result<DvrVolume> open(std::shared_ptr<const svmm::PackedVolume> volume, Context& ctx);
 
   const VolumeInfo& info() const { return info_; }
   const BrickRanges& ranges() const { return ranges_; }
@@ -25,6 +27,7 @@ class DvrVolume {
   const std::shared_ptr<const DenseGrid>& dense() const { return dense_; }
   const std::shared_ptr<const svmm::Volume>& svmm() const { return svmm_; }
   const std::shared_ptr<const vq::Volume>& vq() const { return vq_; }
+  const std::shared_ptr<const svmm::PackedVolume>& packed() const { return packed_; }
 
  private:
   DvrVolume(const VolumeInfo& info, BrickRanges ranges) : info_(info), ranges_(std::move(ranges)) {}
@@ -33,6 +36,7 @@ class DvrVolume {
   std::shared_ptr<const DenseGrid> dense_;
   std::shared_ptr<const svmm::Volume> svmm_;
   std::shared_ptr<const vq::Volume> vq_;
+  std::shared_ptr<const svmm::PackedVolume> packed_;
 };
 
 /// Where gradients come from. analytic: the trilinear cell of a sample. neighbour: the samples of

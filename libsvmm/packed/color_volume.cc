@@ -147,7 +147,7 @@ Result<Voxel> sample_color(const Container& container, const PackedPages& pages,
   // Without a division: voxels are asked for one by one.
   const int log2_side = std::countr_zero(static_cast<uint64_t>(grid.side));
   const uint64_t number = grid.number({voxel.x >> log2_side, voxel.y >> log2_side, voxel.z >> log2_side});
-  const PageCache::Key key{~level, number};  // beside ColorPage, which parents are kept as
+  const PageCache::Key key = Ancestors::solid_key(level, number);
   auto& [last_key, kept] = last.solid;
   if (!kept || last_key != key) {
     auto found = pages.cache.find(key);

@@ -23,6 +23,9 @@ namespace voxkit::svmm {
 struct PackedPages;
 struct Ancestors;
 
+/// Level 31 of the longest side is one voxel.
+inline constexpr int max_packed_levels = 32;
+
 /// What a file is to have, in place of a bound: the encoder finds one that leads to it.
 struct PackedTarget {
   enum class Kind {
@@ -84,6 +87,12 @@ struct PackedLevel {
   uint64_t end = 0;
 };
 
+/// Whether a volume may be encoded with a loss: not labels, nor integers that a table or a fill value has
+/// among them.
+inline bool may_be_off(const VolumeInfo& info) {
+  return !info.is_labels && !info.labels && (!info.fill || info.format == VoxelFormat::float32);
+}
+
 /// Compresses `source`, scalars of any format, into a container written to `sink`. Two passes over a source
 /// of random access, of which each page is encoded alone; one that is forward-only must have been spooled
 /// (formats/spool.h). Coarser levels go through temporary files of a seventh of the raw bytes ($TMPDIR).
@@ -97,6 +106,14 @@ Result<PackedParams> encode_packed(VolumeSource& source, const PackedOptions& op
 /// Whether a container of Codec::svmm is of this layout.
 bool is_packed(const Container& container);
 
+/// A page of a volume.
+struct PackedPage {
+  Index3 lo{0}, size{0};             ///< size: of scalars
+  bool uniform = false;              ///< all voxels are `value`
+  Voxel value;                       ///< of a uniform one
+  const std::byte* codes = nullptr;  ///< of scalars, x fastest, if it is not uniform
+};
+
 /// A file of this layout, opened for random access. Safe on any bytes. All const functions are thread-safe. A
 /// file that was cut where a level ends has that level and the coarser ones; of the finer ones it has nothing
 /// but their extents in `levels()`, and nobody may ask for their voxels.
@@ -107,6 +124,8 @@ class PackedVolume {
                                                           MemoryBudget& memory);
   ~PackedVolume();
   const VolumeInfo& info() const { return info_; }
+  /// The same of a level: its dims and place, and whether its values are rounded.
+  VolumeInfo info_of(int level) const;
   const PackedParams& params() const { return params_; }
   const std::vector<PackedLevel>& levels() const { return levels_; }
   /// The finest level that is there: 0, unless the file was cut.
@@ -123,17 +142,26 @@ class PackedVolume {
   /// `take`.
   Status visit_masks(const std::function<Status(Index3 lo, const page::Mask& mask)>& take,
                      Context& ctx) const;
-  /// Voxels of level 0, as sample, for one thread, which asks for neighbours mostly.
+  /// Voxels of a level that is there, for one thread, which asks for neighbours mostly. Keeps pages beside
+  /// those that are kept for all: `reader_pages`.
   class Reader {
    public:
-    explicit Reader(const PackedVolume& volume);
+    struct Recent;
+    Reader(const PackedVolume& volume, int level);
     ~Reader();
     Result<Voxel> at(Index3 voxel);
+    /// The page that a voxel is in. What it points to is there until a page is asked for that is less than 4
+    /// pages away.
+    Result<PackedPage> page(Index3 voxel);
+    /// Of scalars: the voxels of a small box.
+    Status read(const Box& box, VoxelSpan out);
 
    private:
     const PackedVolume& volume_;
-    std::unique_ptr<Ancestors> last_;  ///< pages
+    int level_;
+    std::unique_ptr<Recent> recent_;
   };
+  static constexpr size_t reader_pages = 64;
   /// The value of the box where its pages take no bytes; nothing where that takes decoding.
   std::optional<Voxel> uniform(const Box& box, int level) const;
   /// Verifies every checksum and decodes every page. Errors name level and page.

@@ -547,8 +547,10 @@ Result<PackedParams> encode_packed(VolumeSource& source, const PackedOptions& op
     return bad_usage(
         fmt::format("a target of {}: expected a number above 0, up to 1000", options.target->value));
   if ((options.max_error > 0 || options.target) && (info.is_labels || info.labels))
-    return bad_usage(
-        "labels have no values between them: expected a bound of 0 (--max-error 0 or --quality 100)");
+    return bad_usage(fmt::format("{}: expected a bound of 0 (--max-error 0 or --quality 100)",
+                                 info.is_labels ? "labels have no values between them"
+                                                : "values that are 65536 and more apart are held by a table, "
+                                                  "which has no steps"));
   if ((options.max_error >= 1 || options.target) && info.fill && !floats)
     return bad_usage(
         "integers with a fill value, which is to come back as it is: expected a bound of 0 (--max-error 0 or "

@@ -22,9 +22,6 @@ inline constexpr uint32_t pages_kind = chunk_kind("PAGE");  ///< index: level; p
 inline constexpr uint32_t mask_kind = chunk_kind("MASK");
 inline constexpr uint32_t mask_model_kind = chunk_kind("MMOD");
 
-/// Level 31 of the longest side is one voxel.
-inline constexpr int max_packed_levels = 32;
-
 inline Index3 level_dims(Index3 dims, int level) {
   const int64_t factor = int64_t{1} << level;
   return (dims + (factor - 1)) / factor;

@@ -82,9 +82,50 @@ struct Ancestors
     : std::array<std::pair<uint64_t, std::shared_ptr<const PageCache::Page>>, max_packed_levels> {
   /// Of colours, the page that a voxel was asked of last, without what is void.
   std::pair<PageCache::Key, std::shared_ptr<const PageCache::Page>> solid;
+
+  static PageCache::Key solid_key(int level, uint64_t number) {
+    return {~level, number};  // beside ColorPage, which parents are kept as
+  }
 };
 
-/// Of files of colours, as those of PackedVolume.
+/// The voxel that a code of scalars stands for.
+Voxel voxel_of(uint32_t code, const ValueMap& map, VoxelFormat format);
+
+/// Calls work(T()) with the type of codes of a format.
+template <class Work>
+auto with_codes(VoxelFormat format, const Work& work) {
+  switch (code_bytes(format)) {
+    case 4:
+      return work(uint32_t());
+    case 2:
+      return work(uint16_t());
+    default:
+      return work(uint8_t());
+  }
+}
+
+/// The codes of a page of scalars, kept or decoded; those of the coarser ones that this takes are kept in
+/// `ancestors`. T: of the file's codes.
+template <class T>
+Result<std::shared_ptr<const PageCache::Page>> codes_of(const Container& container, const PackedPages& pages,
+                                                        int level, uint64_t number, Ancestors& ancestors);
+/// A voxel of a page of scalars of so many voxels.
+template <class T>
+Voxel voxel_at(const PageCache::Page& codes, Index3 at, Index3 size, const ValueMap& map,
+               VoxelFormat format) {
+  T code;
+  std::memcpy(&code, codes.data() + static_cast<size_t>((at.z * size.y + at.y) * size.x + at.x) * sizeof(T),
+              sizeof(T));
+  return voxel_of(code, map, format);
+}
+
+/// Of files of scalars, as those of PackedVolume.
+Status decode_scalars(const Container& container, const PackedPages& pages, const PackedParams& params,
+                      VoxelFormat format, const Box& box, int level, VoxelSpan out);
+Result<Voxel> sample_scalar(const Container& container, const PackedPages& pages, const PackedParams& params,
+                            VoxelFormat format, Index3 voxel, int level, Ancestors& last);
+
+/// Of files of colours.
 Status decode_colors(const Container& container, const PackedPages& pages, const PackedParams& params,
                      const Box& box, int level, VoxelSpan out);
 Result<Voxel> sample_color(const Container& container, const PackedPages& pages, const PackedParams& params,

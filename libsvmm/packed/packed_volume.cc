@@ -3,20 +3,12 @@
 #include <array>
 #include <atomic>
 #include <cmath>
-#include <cstring>
 
 #include "formats/parallel.h"
 #include "formats/volume_chunks.h"
-#include "libpage/page.h"
 #include "libsvmm/packed/packed_pages.h"
 
 namespace voxkit::svmm {
-namespace {
-
-/// Pages that are decoded side by side.
-constexpr size_t most_jobs = 8;
-
-}  // namespace
 
 PartChunks::PartChunks(uint32_t chunk_kind, uint64_t entries_of_page, uint64_t parts)
     : kind(chunk_kind),
@@ -177,138 +169,10 @@ Result<std::shared_ptr<const PackedVolume>> PackedVolume::open(std::shared_ptr<c
   return std::shared_ptr<const PackedVolume>(volume);
 }
 
-namespace {
-
-template <class T>
-Result<std::shared_ptr<const PageCache::Page>> codes_of(const Container& container, const PackedPages& pages,
-                                                        int level, uint64_t number, Ancestors& ancestors);
-
-/// The parents of a page whose model has them; what holds their samples is kept in `ancestors`.
-template <class T>
-Result<page::Parent<T>> parent_of(const Container& container, const PackedPages& pages, int level,
-                                  uint64_t number, Ancestors& ancestors) {
-  const PageGrid& above = pages.levels[static_cast<size_t>(level + 1)].grid;
-  const Index3 child = pages.levels[static_cast<size_t>(level)].grid.index(number);
-  VOX_TRY(const auto codes,
-          codes_of<T>(container, pages, level + 1, above.number(child / int64_t{2}), ancestors));
-  page::Parent<T> parent = placed<T>(child, above);
-  parent.samples = {reinterpret_cast<const T*>(codes->data()), codes->size() / sizeof(T)};
-  return parent;
-}
-
-/// The codes of a page, kept or decoded, and those of the coarser ones that this takes.
-template <class T>
-Result<std::shared_ptr<const PageCache::Page>> codes_of(const Container& container, const PackedPages& pages,
-                                                        int level, uint64_t number, Ancestors& ancestors) {
-  auto& [last_number, last] = ancestors[static_cast<size_t>(level)];
-  if (last && last_number == number) return last;
-  const PageCache::Key key{level, number};
-  auto found = pages.cache.find(key);
-  if (!found) {
-    const auto& l = pages.levels[static_cast<size_t>(level)];
-    page::Parent<T> parent;
-    if (l.model->has_parents()) {
-      VOX_TRY(parent, parent_of<T>(container, pages, level, number, ancestors));
-    }
-    VOX_TRY(const auto bytes, pages.page(container, level, number));
-    const page::Extent extent = l.grid.extent(number);
-    const auto count = static_cast<size_t>(extent.voxels());
-    auto made = std::make_shared<PageCache::Page>(count * sizeof(T));
-    const Status status = page::decode_page(*l.model, bytes, extent,
-                                            std::span<T>(reinterpret_cast<T*>(made->data()), count), parent);
-    if (!status) return tl::unexpected<Error>(at_page(container, level, number, l.grid, status.error()));
-    ++pages.decoded;
-    found = std::move(made);
-    pages.cache.keep(key, found);
-  }
-  last_number = number;
-  last = found;
-  return found;
-}
-
-template <class T>
-Status decode_box(const Container& container, const PackedVolume& volume, const PackedPages& pages,
-                  const Box& box, int level, VoxelSpan out) {
-  const auto& l = pages.levels[static_cast<size_t>(level)];
-  const PageGrid& grid = l.grid;
-  const Index3 first = box.lo / grid.side, last = (box.hi + (grid.side - 1)) / grid.side;
-  std::vector<T> buffer(most_jobs * page::max_voxels);
-  std::array<page::PageJob<T>, most_jobs> jobs;
-  std::array<uint64_t, most_jobs> numbers;
-  size_t waiting = 0;
-  Ancestors ancestors;
-  const auto flush = [&]() -> Status {
-    size_t failed = 0;
-    const auto batch = std::span<const page::PageJob<T>>(jobs).first(waiting);
-    if (const Status status = page::decode_pages(*l.model, batch, &failed); !status)
-      return tl::unexpected<Error>(at_page(container, level, numbers[failed], grid, status.error()));
-    for (size_t i = 0; i < waiting; ++i)
-      place(jobs[i].out.data(), grid.box(numbers[i]), box, volume.params().map, volume.info().format, out);
-    pages.decoded += waiting;
-    waiting = 0;
-    return {};
-  };
-  const auto add = [&](Index3 at) -> Status {
-    const uint64_t number = grid.number(at);
-    VOX_TRY(const auto bytes, pages.page(container, level, number));
-    const page::Extent extent = grid.extent(number);
-    numbers[waiting] = number;
-    jobs[waiting] = {
-        bytes,
-        extent,
-        std::span(buffer).subspan(waiting * page::max_voxels, static_cast<size_t>(extent.voxels())),
-        {}};
-    if (l.model->has_parents()) {
-      VOX_TRY(jobs[waiting].parent, parent_of<T>(container, pages, level, number, ancestors));
-    }
-    return ++waiting == most_jobs ? flush() : Status();
-  };
-  // The up to 8 pages of one parent after each other. What a job's parents lie in must be there until it is
-  // done.
-  const Index3 first_parent = first / int64_t{2}, last_parent = (last + int64_t{1}) / int64_t{2};
-  for (int64_t z = first_parent.z; z < last_parent.z; ++z)
-    for (int64_t y = first_parent.y; y < last_parent.y; ++y)
-      for (int64_t x = first_parent.x; x < last_parent.x; ++x) {
-        for (int i = 0; i < 8; ++i) {
-          const Index3 at = Index3(x, y, z) * int64_t{2} + Index3(i & 1, i >> 1 & 1, i >> 2);
-          if (glm::all(glm::greaterThanEqual(at, first)) && glm::all(glm::lessThan(at, last)))
-            VOX_CHECK(add(at));
-        }
-        if (waiting > 0 && l.model->has_parents()) VOX_CHECK(flush());
-      }
-  return waiting > 0 ? flush() : Status();
-}
-
-template <class T>
-Result<Voxel> sample_of(const Container& container, const PackedVolume& volume, const PackedPages& pages,
-                        Index3 voxel, int level, Ancestors& last) {
-  const PageGrid& grid = pages.levels[static_cast<size_t>(level)].grid;
-  const uint64_t number = grid.number(voxel / grid.side);
-  VOX_TRY(const auto codes, codes_of<T>(container, pages, level, number, last));
-  const Box box = grid.box(number);
-  const Index3 at = voxel - box.lo, size = box.size();
-  T code;
-  std::memcpy(&code, codes->data() + static_cast<size_t>((at.z * size.y + at.y) * size.x + at.x) * sizeof(T),
-              sizeof(T));
-  if constexpr (sizeof(T) == 4)
-    return Voxel::of(volume.params().map.value(code));
-  else
-    return Voxel::of(code);
-}
-
-}  // namespace
-
 Status PackedVolume::decode(const Box& box, int level, VoxelSpan out) const {
   if (box.empty()) return {};
   if (is_color(info_.format)) return decode_colors(*container_, *pages_, params_, box, level, out);
-  switch (code_bytes(info_.format)) {
-    case 4:
-      return decode_box<uint32_t>(*container_, *this, *pages_, box, level, out);
-    case 2:
-      return decode_box<uint16_t>(*container_, *this, *pages_, box, level, out);
-    default:
-      return decode_box<uint8_t>(*container_, *this, *pages_, box, level, out);
-  }
+  return decode_scalars(*container_, *pages_, params_, info_.format, box, level, out);
 }
 
 Result<Voxel> PackedVolume::sample(Index3 voxel, int level) const {
@@ -316,23 +180,9 @@ Result<Voxel> PackedVolume::sample(Index3 voxel, int level) const {
   return sample(voxel, level, last);
 }
 
-PackedVolume::Reader::Reader(const PackedVolume& volume)
-    : volume_(volume), last_(std::make_unique<Ancestors>()) {}
-PackedVolume::Reader::~Reader() = default;
-Result<Voxel> PackedVolume::Reader::at(Index3 voxel) {
-  return volume_.sample(voxel, 0, *last_);
-}
-
 Result<Voxel> PackedVolume::sample(Index3 voxel, int level, Ancestors& last) const {
   if (is_color(info_.format)) return sample_color(*container_, *pages_, params_, voxel, level, last);
-  switch (code_bytes(info_.format)) {
-    case 4:
-      return sample_of<uint32_t>(*container_, *this, *pages_, voxel, level, last);
-    case 2:
-      return sample_of<uint16_t>(*container_, *this, *pages_, voxel, level, last);
-    default:
-      return sample_of<uint8_t>(*container_, *this, *pages_, voxel, level, last);
-  }
+  return sample_scalar(*container_, *pages_, params_, info_.format, voxel, level, last);
 }
 
 std::optional<Voxel> PackedVolume::uniform(const Box& box, int level) const {
@@ -347,15 +197,7 @@ std::optional<Voxel> PackedVolume::uniform(const Box& box, int level) const {
         if (!bytes || !bytes->empty()) return std::nullopt;
       }
   if (colors) return Voxel{};
-  const uint32_t code = l.model->background();
-  switch (code_bytes(info_.format)) {
-    case 4:
-      return Voxel::of(params_.map.value(code));
-    case 2:
-      return Voxel::of(static_cast<uint16_t>(code));
-    default:
-      return Voxel::of(static_cast<uint8_t>(code));
-  }
+  return voxel_of(l.model->background(), params_.map, info_.format);
 }
 
 Status PackedVolume::check(Context& ctx) const {
@@ -382,6 +224,15 @@ Status PackedVolume::visit_masks(const std::function<Status(Index3 lo, const pag
   return svmm::visit_masks(*container_, *pages_, take, ctx);
 }
 
+VolumeInfo PackedVolume::info_of(int level) const {
+  VolumeInfo info = info_;
+  info.dims = levels_[static_cast<size_t>(level)].dims;
+  const double factor = std::ldexp(1.0, level);
+  info.affine = info.affine.coarser({factor, factor, factor});
+  info.rounded = info.rounded || params_.max_error > 0;
+  return info;
+}
+
 uint64_t PackedVolume::pages_decoded() const {
   return pages_->decoded;
 }
@@ -392,11 +243,7 @@ class PackedSource final : public VolumeSource {
  public:
   PackedSource(std::shared_ptr<const PackedVolume> volume, int level)
       : volume_(std::move(volume)), level_(level) {
-    info_ = volume_->info();
-    info_.dims = volume_->levels()[static_cast<size_t>(level)].dims;
-    const double factor = std::ldexp(1.0, level);
-    info_.affine = info_.affine.coarser({factor, factor, factor});
-    info_.rounded = info_.rounded || volume_->params().max_error > 0;
+    info_ = volume_->info_of(level);
   }
   Status read(const Box& box, VoxelSpan out) override { return volume_->decode(box, level_, out); }
   std::optional<Voxel> uniform(const Box& box) const override { return volume_->uniform(box, level_); }

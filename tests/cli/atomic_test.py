@@ -19,7 +19,7 @@ import unittest
 
 OPTIONS = argparse.Namespace(bin=None, tool="svmm-encode", kills=20, seed=1)
 # About 0.3 s and over 10 MB: long enough to be killed in the middle of. Something for a pipe, and something endless.
-WORKS = {"svmm-encode": (["menger:5", "-q", "100", "-j", "1"], ["menger:4", "-q", "100"], "menger:7"),
+WORKS = {"svmm-encode": (["menger:5", "-q", "100", "-w", "0", "-j", "1"], ["menger:4", "-q", "100", "-w", "0"], "menger:7"),
          "vq-encode": (["noise:250:1", "-j", "1"], ["noise:100:1"], "noise:4000:1")}
 
 

@@ -23,7 +23,7 @@ SCALAR, COLOR = "noise:48:1", "menger:3"
 
 # Of each output: the tool, what it is given before -o, and the name; "@" is the folder of inputs.
 OUTPUTS = {
-    "svmm": ("svmm-encode", [SCALAR], "a.svmm"),
+    "svmm": ("svmm-encode", [SCALAR, "-w", "0"], "a.svmm"),
     "svmm zstd": ("svmm-encode", [SCALAR, "--zstd", "3"], "a.svmm"),
     "svmm packed": ("svmm-encode", [SCALAR, "--layout", "packed"], "a.svmm"),
     "vqv": ("vq-encode", [SCALAR], "a.vqv"),
@@ -57,7 +57,7 @@ OUTPUTS = {
 # Each of their files is an output of its own: those that were done stay, whole.
 ONE_BY_ONE = {"frames"}
 PIPED = {  # what is written to standard output with -o -
-    "svmm": ("svmm-encode", ["noise:100:1"]),
+    "svmm": ("svmm-encode", ["noise:100:1", "-w", "0"]),
     "vqv": ("vq-encode", ["noise:100:1"]),
     "nrrd": ("vox-convert", ["noise:100:1"]),
     "decoded": ("vox-decode", ["@/large.svmm"]),

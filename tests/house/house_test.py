@@ -34,7 +34,7 @@ libcolor          -> formats formats/image libcolor/surface libcolor/terms libco
 libmetrics        -> formats formats/image
 librender         -> formats formats/image
 librender/cast    -> formats librender libsvmm libsvmm/packed libcolor libcolor/dag libcolor/surface
-librender/dvr     -> formats librender librender/cast libsvmm libvq
+librender/dvr     -> formats librender librender/cast libsvmm libsvmm/packed libvq
 librender/device  -> formats librender librender/cast librender/dvr libsvmm libvq libcolor libcolor/dag
 """
 # Files of a folder that stand below it: the terms that all of libcolor shares.

@@ -12,6 +12,7 @@
 
 #include "formats/volume/readers.h"
 #include "librender/light.h"
+#include "tests/libsvmm/packed_files.h"
 #include "tests/libsvmm/volumes.h"
 #include "tests/libvq/volumes.h"
 
@@ -218,6 +219,9 @@ TEST(Dvr, IsTheSameFromEveryFormSkippedOrNotOnAnyMachine) {
           scene_of(vq::test::encode_to_memory(source).open(), transfer),
           scene_of(vq::test::encode_to_memory(source, packed).open(), transfer),
           scene_of(svmm::test::encode_to_memory(source, params).open(), transfer),
+          scene_of(svmm::test::open(svmm::test::encode(source, {}).bytes), transfer),
+          scene_of(svmm::test::open(svmm::test::encode(source, {.levels = false, .page_side = 8}).bytes),
+                   transfer),
       };
       const Camera camera = Camera::orbit(200 + 10 * seed, 15, 1.4, 45);
       for (const auto kind : {Gradient::analytic, Gradient::neighbour})
@@ -249,10 +253,12 @@ TEST(Dvr, FloatsAndThinVolumes) {
     svmm::Params params = svmm::test::make_params(info.format, 100, {}, 4);
     params.full_scale = 60;
     const DvrScene plain = scene_of(dense(source), transfer),
-                   compressed = scene_of(svmm::test::encode_to_memory(source, params).open(), transfer);
+                   compressed = scene_of(svmm::test::encode_to_memory(source, params).open(), transfer),
+                   pages = scene_of(svmm::test::open(svmm::test::encode(source, {}).bytes), transfer);
     const Camera camera = Camera::orbit(20, 30, 1.5, 45);
     const Frame expected = draw(plain, camera, small());
     expect_same(draw(compressed, camera, small()), expected);
+    expect_same(draw(pages, camera, small()), expected);
   }
 }
 

@@ -155,7 +155,8 @@ SAMPLE_TYPES = (  # of a .raw file; voxel format, bits of a voxel, bases, layout
 @unittest.skipUnless(BIN, "VOXKIT_BIN is not set")
 class Tools(ToolCase):
     def encode(self, source, *options):
-        self.run_program(os.path.join(BIN, "svmm-encode"), source, "-f", "-o", self.path("x.svmm"), *options)
+        self.run_program(os.path.join(BIN, "svmm-encode"), source, "-f", "-o", self.path("x.svmm"),
+                         *(() if "--layout" in options else ("--layout", "plain")), *options)
         return self.path("x.svmm")
 
     def compare(self, file):

@@ -65,8 +65,9 @@ Json levels_json(const svmm::PackedVolume& volume) {
   for (int64_t index = volume.finest(); index < volume.params().levels; ++index) {
     const svmm::PackedLevel& level = volume.levels()[static_cast<size_t>(index)];
     Json json = Json::object();
-    json.set("mip_factor", int64_t{1} << index).set("index", index).set("dims", level.dims);
-    json.set("pages", level.pages.x * level.pages.y * level.pages.z).set("page_bytes", level.page_bytes);
+    json.set("index", index).set("blockwidth", volume.params().page_side);
+    json.set("mip_factor", int64_t{1} << index).set("dims", level.dims);
+    json.set("blocks", level.pages.x * level.pages.y * level.pages.z).set("block_bytes", level.page_bytes);
     json.set("end", level.end);
     array.push(std::move(json));
   }

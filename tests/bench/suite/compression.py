@@ -17,7 +17,8 @@ def lossless_methods(volume):
     """All that is lossless for a volume's type; the first one is what ratios are of."""
     found = [peers.ours(volume, "vq-encode"), peers.ours(volume, "vq-encode", "--codebook", "packed")] \
         if volume.whole_numbers else []
-    found += [peers.ours(volume, "svmm-encode", "-q", 100), peers.ours(volume, "svmm-encode", "-q", 100, "--zstd", 9)]
+    found += [peers.ours(volume, "svmm-encode", "-q", 100), peers.ours(volume, "svmm-encode", "-q", 100, "-w", 0),
+              peers.ours(volume, "svmm-encode", "-q", 100, "--zstd", 9)]
     if volume.type != "rgba8" and peers.has_numpy():
         found.append(peers.openvdb(volume))
     found += peers.installed(("zstd", lambda: peers.zstd(volume, 3)), ("zstd", lambda: peers.zstd(volume, 19)),
@@ -34,7 +35,8 @@ def bounded_methods(volume):
     scale = volume.difference(volume.raw)["peak"]
     bound = max(1, int(scale / 100))
     return [peers.ours(volume, "vq-encode", "--max-error", bound),
-            peers.ours(volume, "svmm-encode", "--delta", text(bound / scale))] + peers.installed(
+            peers.ours(volume, "svmm-encode", "--delta", text(bound / scale)),
+            peers.ours(volume, "svmm-encode", "--delta", text(bound / scale), "-w", 0)] + peers.installed(
                 ("zfp", lambda: widest_zfp(volume, bound)))
 
 
@@ -54,7 +56,7 @@ def widest_zfp(volume, bound):
 
 def small_methods(volume):
     return [peers.ours(volume, "vq-encode", "--reduce", 16), peers.ours(volume, "svmm-encode", "-q", 90),
-            peers.ours(volume, "svmm-encode", "-q", 80)] + peers.installed(
+            peers.ours(volume, "svmm-encode", "-q", 80), peers.ours(volume, "svmm-encode", "-q", 90, "-w", 0)] + peers.installed(
                 ("zfp", lambda: peers.zfp(volume, "-r 1", "-r", 1)), ("zfp", lambda: peers.zfp(volume, "-r 0.5", "-r", 0.5)))
 
 
