@@ -74,6 +74,12 @@ constexpr std::array builtins{
               const auto dims = extents(n[0], n[1], n[2]);
               return dims ? membrane_source(*dims, n[3]) : nullptr;
             }},
+    Builtin{"cells", "cells:N:COUNT with N 1 to 1664510 and COUNT 1 to 65536", ":",
+            [](const Numbers& n) {
+              return is_side(n[0]) && n[1] >= 1 && n[1] <= most_cells
+                         ? cells_source(static_cast<int64_t>(n[0]), static_cast<int64_t>(n[1]))
+                         : nullptr;
+            }},
 };
 
 const Builtin* find(std::string_view name) {

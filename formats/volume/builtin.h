@@ -45,4 +45,10 @@ std::unique_ptr<VolumeSource> noise_source(int64_t side, uint64_t seed);
 /// slowly. dims: any volume.
 std::unique_ptr<VolumeSource> membrane_source(Index3 dims, uint64_t seed);
 
+/// builtin_cells.cc: a segmentation, `count` cells in side^3 voxels: each voxel is in the cell of the nearest
+/// of so many random points. Labels of 32 bits that lie far apart, by a table, as DENSITY8 or, of more than
+/// 256 cells, DENSITY16. side >= 1; count 1 to most_cells.
+inline constexpr uint64_t most_cells = 65536;
+std::unique_ptr<VolumeSource> cells_source(int64_t side, int64_t count);
+
 }  // namespace voxkit

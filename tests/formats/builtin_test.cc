@@ -2,6 +2,7 @@
 
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <array>
 #include <cmath>
 #include <cstdlib>
@@ -302,10 +303,35 @@ TEST(Membrane, LooksLikeSectionsOfTissue) {
   EXPECT_NE(voxels, test::read_all<uint8_t>(*open("membrane:300,200,12:10")));
 }
 
+TEST(Builtin, CellsAreThoseOfTheirPoints) {
+  auto source = open("cells:40:30");
+  const VolumeInfo& info = source->info();
+  EXPECT_TRUE(info.is_labels);
+  ASSERT_TRUE(info.labels);
+  ASSERT_EQ(info.labels->size(), 30u);
+  EXPECT_TRUE(std::ranges::is_sorted(*info.labels, std::less_equal()));
+  EXPECT_GT(info.labels->back() - info.labels->front(), 65536);
+  const auto voxels = test::read_all<uint8_t>(*source);
+  // Cells are convex: between two voxels of one there is no other, but for what rounding makes of it.
+  std::mt19937 random(5);
+  std::array<int, 30> found{};
+  for (const uint8_t v : voxels) ++found[v];
+  EXPECT_TRUE(std::ranges::all_of(found, [](int n) { return n > 0; }));
+  const auto at = [&](Index3 p) { return voxels[static_cast<size_t>((p.z * 40 + p.y) * 40 + p.x)]; };
+  for (int n = 0; n < 20000; ++n) {
+    const auto any = [&] { return static_cast<int64_t>(random() % 20) * 2; };
+    const Index3 a(any(), any(), any()), b(any(), any(), any());
+    if (at(a) == at(b)) {
+      ASSERT_EQ(at((a + b) / int64_t{2}), at(a));
+    }
+  }
+  EXPECT_EQ(open("cells:9:257")->info().format, VoxelFormat::density16);
+}
+
 TEST(Builtin, BoxesAreSubBoxesOfTheWhole) {
   std::mt19937_64 random(4);
   for (const char* name : {"menger:3", "marschner-lobb:37", "sphere:41", "noise:43:7", "membrane:700,70,9:3",
-                           "membrane:1,1,1:0"}) {
+                           "membrane:1,1,1:0", "cells:45:60", "cells:3:400"}) {
     auto source = open(name);
     const Index3 dims = source->info().dims;
     const std::vector<Voxel> whole = read_box(*source, source->info().box());
@@ -326,7 +352,8 @@ TEST(Builtin, BoxesAreSubBoxesOfTheWhole) {
 TEST(Builtin, LargestVolumesCanBeReadAnywhere) {
   for (const char* name :
        {"menger:13", "marschner-lobb:1664510", "sphere:1664510", "noise:1664510:18446744073709551615",
-        "membrane:2147483648,1024,2097152:18446744073709551615", "membrane:1,2147483648,2147483648:0"}) {
+        "membrane:2147483648,1024,2097152:18446744073709551615", "membrane:1,2147483648,2147483648:0",
+        "cells:1664510:65536"}) {
     auto source = open(name);
     ASSERT_TRUE(source) << name;
     const Index3 dims = source->info().dims;
@@ -350,6 +377,7 @@ TEST(Builtin, VoxelsAreTheSameEverywhere) {
   EXPECT_EQ(sum("sphere:64"), 0x383edad0264bb0fdu);
   EXPECT_EQ(sum("noise:64:1"), 0x3c7c808e506fa0ccu);
   EXPECT_EQ(sum("membrane:600,64,40:1"), 0x8e6d998fe30e68abu);
+  EXPECT_EQ(sum("cells:50:300"), 0xf4eb940f20bdd7e3u);
 }
 
 TEST(Builtin, MalformedNamesAreUsageErrors) {
@@ -383,6 +411,10 @@ TEST(Builtin, MalformedNamesAreUsageErrors) {
                            "membrane:0,2,3:1",
                            "membrane:1,2,2147483649:1",
                            "membrane:2147483648,2147483648,2:1",
+                           "cells:0:1",
+                           "cells:5:0",
+                           "cells:5:65537",
+                           "cells:5",
                            "membrane:1:2:3:4",
                            "membrane:1,2,3,4:1"}) {
     EXPECT_TRUE(is_builtin(name)) << name;
