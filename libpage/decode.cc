@@ -80,6 +80,7 @@ Status usable(const Model& model, const PageJob<T>& job) {
         "a page decoded without the parents of all its voxels: expected those that its model has");
   if (model.max_sample() > std::numeric_limits<T>::max())
     return bad_usage("a page decoded into samples of too few bits: expected those of its model");
+  if (job.mask && model.data().labels) return bad_usage("labels with void voxels: expected all to be solid");
   if (job.mask && model.data().wide())
     return bad_usage("a page with void voxels of more than 16 bits: expected a model of at most so many");
   return {};
@@ -99,6 +100,16 @@ bool decode_constant(const ModelData& model, const PageJob<T>& job, bool& whole)
   }
   std::ranges::fill(job.out, sample_of<T>(model, value));
   return true;
+}
+
+template <class T>
+bool decode_names(const LabelTables& tables, const PageJob<T>& job) {
+  std::vector<uint32_t> parents;
+  std::array<uint32_t, max_voxels> values;
+  const auto room = std::span(values).first(job.out.size());
+  const bool whole = decode_labels(tables, job.page, job.extent, widened(job.parent, parents), room);
+  std::ranges::transform(room, job.out.begin(), [](uint32_t value) { return static_cast<T>(value); });
+  return whole;
 }
 
 Status damaged() {
@@ -137,6 +148,10 @@ Status decode_all(const Model& shared, std::span<const PageJob<T>> jobs, size_t*
     bool whole = true;
     if (decode_constant(model, job, whole)) {
       judge(&job, whole);
+      continue;
+    }
+    if (model.labels) {
+      judge(&job, decode_names(*model.labels, job));
       continue;
     }
     if (job.mask && *job.mask != full_mask(job.extent)) {

@@ -69,6 +69,13 @@ Status encode(const Model& shared, std::span<const T> samples, Extent extent, st
       out.push_back(static_cast<std::byte>(middle >> 8 * byte & 0xff));
     return {};
   }
+  if (model.labels) {
+    if (mask) return bad_usage("labels with void voxels: expected all to be solid");
+    std::vector<uint32_t> parents;
+    encode_labels(*model.labels, page, extent, widened(parent, parents), out, model.value_bytes());
+    tell([&](size_t i) { return page[i]; });
+    return {};
+  }
   Residuals residuals;
   std::array<uint32_t, max_voxels> lossy;
   if (model.wide()) {

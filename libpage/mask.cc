@@ -1,19 +1,12 @@
 #include "libpage/mask.h"
 
-#include "libpage/bits.h"
+#include "libpage/decision.h"
 #include "libpage/parent_rows.h"
-#include "libpage/rans.h"
 
 namespace voxkit::page {
 namespace {
 
 constexpr uint32_t version_alone = 1, version_with_parents = 2;
-
-/// Parts of 2048 that solid voxels may have, by number. Number 0 is that of contexts which no sample had.
-constexpr std::array<uint16_t, 32> parts = {1024, 1,    2,    4,    7,    12,   20,   32,   48,   72,   104,
-                                            148,  208,  288,  392,  528,  700,  900,  1148, 1348, 1520, 1656,
-                                            1760, 1840, 1900, 1944, 1976, 2000, 2016, 2028, 2041, 2047};
-constexpr int number_bits = 5, run_golomb = 2;
 
 /// Rows as a mask has them, at bits 2 to 17, with void around: bit x + 2 is voxel x.
 uint32_t row_at(const Mask& mask, int y, int z) {
@@ -136,33 +129,14 @@ void MaskModel::Builder::add(const Mask& mask, Extent extent, const MaskParent& 
 MaskModel MaskModel::Builder::build() const {
   auto data = std::make_shared<Data>();
   data->parents = parents_;
-  for (size_t c = 0; c < contexts; ++c) {
-    const auto [voids, solids] = counts_[c];
-    if (voids + solids == 0) continue;
-    // The part nearest to what was seen, as if half a voxel more of each had been.
-    const uint64_t part = (2 * solids + 1) * table_total / (2 * (voids + solids) + 2);
-    size_t best = 1;
-    for (size_t n = 2; n < parts.size(); ++n)
-      if (parts[n - 1] + parts[n] < 2 * part) best = n;
-    data->number[c] = static_cast<uint8_t>(best);
-  }
+  for (size_t c = 0; c < contexts; ++c) data->number[c] = decision_number(counts_[c]);
   return MaskModel(std::move(data));
 }
 
 std::vector<std::byte> MaskModel::serialise() const {
   BitWriter out;
   out.put(data_->parents ? version_with_parents : version_alone, 8);
-  uint32_t unknown = 0;
-  for (const uint8_t number : data_->number) {
-    if (number == 0) {
-      ++unknown;
-      continue;
-    }
-    out.golomb(unknown, run_golomb);
-    out.put(number, number_bits);
-    unknown = 0;
-  }
-  if (unknown != 0) out.golomb(unknown, run_golomb);
+  write_decision_numbers(out, data_->number);
   return out.take();
 }
 
@@ -174,15 +148,8 @@ Result<MaskModel> MaskModel::parse(std::span<const std::byte> bytes) {
     return wrong("unknown version: expected 1 or 2");
   auto data = std::make_shared<Data>();
   data->parents = version == version_with_parents;
-  for (size_t c = 0; c < contexts; ++c) {
-    const uint32_t unknown = in.golomb(run_golomb);
-    if (in.overrun() || unknown > contexts - c) return wrong("expected 8192 contexts");
-    c += unknown;
-    if (c == contexts) break;
-    const uint32_t number = in.get(number_bits);
-    if (number == 0) return wrong("a context that is known and unknown: expected 1 to 31");
-    data->number[c] = static_cast<uint8_t>(number);
-  }
+  if (!read_decision_numbers(in, data->number))
+    return wrong("expected 8192 contexts, known ones from 1 to 31");
   if (!in.at_end()) return wrong("expected it to end with its last context");
   return MaskModel(std::move(data));
 }
@@ -194,16 +161,11 @@ void MaskModel::encode(const Mask& mask, Extent extent, std::vector<std::byte>& 
     out.push_back(std::byte{1});
     return;
   }
-  struct Decision {
-    uint16_t part, start;
-  };
   std::vector<Decision> decisions;
   decisions.reserve(max_voxels);
   Mask copy = mask;
   visit(data_->parents, copy, extent, parent, [&](uint32_t context, bool solid) {
-    const uint16_t part = parts[data_->number[context]];
-    decisions.push_back(solid ? Decision{part, 0}
-                              : Decision{static_cast<uint16_t>(table_total - part), part});
+    decisions.push_back(decision(data_->number[context], solid));
     return solid;
   });
   RansEncoder coder;
@@ -225,15 +187,8 @@ Result<Mask> MaskModel::decode(std::span<const std::byte> page, Extent extent,
   Mask mask;
   RansDecoder coder;
   coder.open(page);
-  visit(data_->parents, mask, extent, parent, [&](uint32_t context, bool) {
-    const uint32_t part = parts[data_->number[context]];
-    const auto slot = static_cast<uint32_t>(coder.state & (table_total - 1));
-    const bool solid = slot < part;
-    coder.state =
-        (coder.state >> table_bits) * (solid ? part : table_total - part) + slot - (solid ? 0 : part);
-    coder.renew();
-    return solid;
-  });
+  visit(data_->parents, mask, extent, parent,
+        [&](uint32_t context, bool) { return decide(coder, data_->number[context]); });
   if (!coder.finished())
     return bad_input({}, "mask: it does not end where its voxels end: expected one of this model and extent");
   return mask;

@@ -88,7 +88,7 @@ class MaskModel {
 
    private:
     bool parents_;
-    std::vector<std::array<uint64_t, 2>> counts_;
+    std::vector<std::array<uint64_t, 2>> counts_;  ///< void, solid
   };
 
   /// Safe on any bytes: a model, or ErrorCode::input.

@@ -9,7 +9,8 @@ namespace voxkit::page {
 namespace {
 
 /// Of models without and with parents.
-constexpr uint32_t version_alone = 1, version_with_parents = 2;
+constexpr uint32_t version_alone = 1, version_with_parents = 2, version_labels = 3,
+                   version_labels_with_parents = 4;
 constexpr int weight_golomb = 7, palette_golomb = 2;
 
 tl::unexpected<Error> wrong(const char* what) {
@@ -43,6 +44,7 @@ bool read_weights(BitReader& in, Weights& weights, Classes classes, int voxel_cl
 }  // namespace
 
 void ModelData::derive() {
+  if (labels) return;
   half_steps = static_cast<uint32_t>((uint64_t{1} << 15) / step());
   decoding.resize(static_cast<size_t>(contexts()));
   for (size_t c = 0; c < decoding.size(); ++c) {
@@ -84,6 +86,13 @@ bool number(std::span<const uint32_t> palette, std::span<uint32_t> samples) {
 std::vector<std::byte> Model::serialise() const {
   const ModelData& m = *data_;
   BitWriter out;
+  if (m.labels) {
+    out.put(m.classes.parents ? version_labels_with_parents : version_labels, 8);
+    out.put(m.max_value, 16);
+    out.put(m.background, 16);
+    write_decision_numbers(out, m.labels->numbers);
+    return out.take();
+  }
   out.put(m.classes.parents ? version_with_parents : version_alone, 8);
   out.put(m.palette.empty() ? 0 : 1, 1);
   out.put(m.max_value, 32);
@@ -109,10 +118,24 @@ std::vector<std::byte> Model::serialise() const {
 Result<Model> Model::parse(std::span<const std::byte> bytes) {
   BitReader in(bytes);
   const uint32_t version = in.get(8);
-  if (version != version_alone && version != version_with_parents)
-    return wrong("unknown version: expected 1 or 2");
+  if (version < version_alone || version > version_labels_with_parents)
+    return wrong("unknown version: expected 1 to 4");
   auto made = std::make_shared<ModelData>();
   ModelData& m = *made;
+  if (version >= version_labels) {
+    m.classes.parents = version == version_labels_with_parents;
+    m.max_value = in.get(16);
+    m.background = in.get(16);
+    if (m.background > m.max_value) return wrong("background: expected at most the greatest sample");
+    LabelTables& tables = m.labels.emplace();
+    tables.parents = m.classes.parents;
+    tables.max_value = m.max_value;
+    tables.numbers.resize(label_contexts(tables.parents));
+    if (!read_decision_numbers(in, tables.numbers))
+      return wrong("contexts: expected known ones from 1 to 31");
+    if (!in.at_end()) return wrong("expected it to end with its last context");
+    return Model(std::move(made));
+  }
   const bool has_palette = in.get(1) != 0;
   m.classes.parents = version == version_with_parents;
   m.max_value = in.get(32);
@@ -153,6 +176,9 @@ uint32_t Model::max_error() const {
 }
 bool Model::has_parents() const {
   return data_->classes.parents;
+}
+bool Model::has_labels() const {
+  return data_->labels.has_value();
 }
 uint32_t Model::max_sample() const {
   return data_->palette.empty() ? data_->max_value : data_->palette.back();

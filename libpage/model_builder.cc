@@ -219,12 +219,37 @@ Result<Model> ModelBuilder::build(const ModelOptions& options) const {
     fit(*made, pages, options.rounds);
     return Model(std::move(made));
   };
-  VOX_TRY(Model plain, fitted({}));
-  if (values.empty() || options.max_error != 0) return plain;
-  VOX_TRY(Model numbered, fitted(values));
-  VOX_TRY(const size_t plain_size, size_with(plain, pages_));
-  VOX_TRY(const size_t numbered_size, size_with(numbered, pages_));
-  return numbered_size < plain_size ? numbered : plain;
+  VOX_TRY(Model best, fitted({}));
+  if (options.max_error != 0) return best;
+  const auto keep_smaller = [&](Model other) -> Status {
+    VOX_TRY(const size_t best_size, size_with(best, pages_));
+    VOX_TRY(const size_t other_size, size_with(other, pages_));
+    if (other_size < best_size) best = std::move(other);
+    return {};
+  };
+  if (!values.empty()) {
+    VOX_TRY(Model numbered, fitted(values));
+    VOX_CHECK(keep_smaller(std::move(numbered)));
+  }
+  if (options.labels && max_sample <= 0xffff) VOX_CHECK(keep_smaller(named(options.parents, max_sample)));
+  return best;
+}
+
+Model ModelBuilder::named(bool parents, uint32_t max_sample) const {
+  auto made = std::make_shared<ModelData>();
+  made->classes.parents = parents;
+  made->max_value = max_sample;
+  LabelTables& tables = made->labels.emplace();
+  tables.parents = parents;
+  tables.max_value = max_sample;
+  std::vector<DecisionCounts> counts(label_contexts(parents));
+  std::vector<Sampled> pages;
+  for (const Page& page : pages_) pages.push_back({page.extent, page.samples, {}, parent_of(page)});
+  made->background = common_value(*made, pages);
+  for (const Sampled& page : pages)
+    if (!is_constant(*made, page)) count_labels(tables, page.values, page.extent, page.parent, counts);
+  for (const DecisionCounts& count : counts) tables.numbers.push_back(decision_number(count));
+  return Model(std::move(made));
 }
 
 }  // namespace voxkit::page

@@ -3,10 +3,12 @@
 
 #include <array>
 #include <cstdint>
+#include <optional>
 #include <span>
 #include <vector>
 
 #include "libpage/context.h"
+#include "libpage/label.h"
 #include "libpage/mask.h"
 #include "libpage/predictor.h"
 #include "libpage/symbols.h"
@@ -31,6 +33,8 @@ struct ModelData {
   Classes classes;                ///< whether its pages have parents
   std::array<Weights, most_classes> weights{};
   std::array<Frequencies, most_contexts> tables{};
+  /// In place of weights and tables, of labels.
+  std::optional<LabelTables> labels;
 
   // From these:
   uint32_t half_steps = 0;  ///< 2^15 / step: turns a range into half its steps

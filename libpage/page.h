@@ -29,6 +29,8 @@ class Model {
 
   /// Whether its pages can be coded and decoded only beside those of the next coarser level.
   bool has_parents() const;
+  /// Whether values are coded as names.
+  bool has_labels() const;
   uint32_t max_error() const;
   /// The greatest sample that a page of this model can hold.
   uint32_t max_sample() const;
@@ -61,6 +63,9 @@ struct ModelOptions {
   std::vector<uint32_t> values;
   /// Whether pages have parents.
   bool parents = false;
+  /// Whether values are names, which have nothing between them: then they are coded as such where that is
+  /// smaller, and the bound is 0.
+  bool labels = false;
   /// Of fitting with a bound, 1 or more: each takes as long; fewer make larger pages.
   int rounds = 6;
 };
@@ -88,6 +93,8 @@ class ModelBuilder {
   };
 
  private:
+  /// Of labels.
+  Model named(bool parents, uint32_t max_sample) const;
   template <class T>
   void keep(std::span<const T> samples, Extent extent, const Parent<T>& parent, const Mask* mask);
   std::vector<Page> pages_;

@@ -130,8 +130,9 @@ class WarpBricks {
     const auto head = record.available > 0 ? static_cast<uint32_t>(record.code[0]) : 63u;
     const auto escape_bytes = static_cast<uint32_t>(vq::plain_bytes(view_->bits));
     if (head == vq::escape && record.available > escape_bytes) return plain(record.code + 1);
-    const uint32_t c2 = head & 63;
-    const uint64_t widths = c2 <= 5 && c2 < record.available ? load_le<uint64_t>(record.code + 1) : 0;
+    const bool has_widths = (head & 63) <= 5 && (head & 63) < record.available;
+    const uint32_t c2 = has_widths ? head & 63 : 0;
+    const uint64_t widths = has_widths ? load_le<uint64_t>(record.code + 1) : 0;
     // Four lanes an octant.
     share(vq::brick_voxels / 2, [&](int pair) {
       const auto octant = static_cast<uint32_t>(pair / 4);
@@ -140,7 +141,7 @@ class WarpBricks {
         at += width;
         width = static_cast<uint32_t>(widths >> (o * c2) & ((1u << c2) - 1));
       }
-      const bool valid = c2 <= 5 && width <= 16 && at + width <= record.available;
+      const bool valid = has_widths && width <= 16 && at + width <= record.available;
       for (uint32_t i = static_cast<uint32_t>(pair % 4) * 2, end = i + 2; i < end; ++i) {
         const uint32_t code =
             valid ? vq::load_bits(record.code + at, uint64_t{i} * width, static_cast<int>(width)) : 0;

@@ -446,6 +446,7 @@ class Encoder {
       // Means of voxels may be other values.
       const bool same_values = level == 0 || has_no_means(info_);
       if (options.max_error == 0 && same_values) options.values = values;
+      options.labels = has_no_means(info_);
       if (level > 0 && !raster_.empty()) options.values = raster_.values();
       // Values that are few beside the steps of the bound may take fewer bytes than these.
       const uint64_t steps = options.max_sample / (2 * uint64_t{options.max_error} + 1) + 1;

@@ -12,13 +12,14 @@ using namespace voxkit::page;
 
 struct Kind {
   uint32_t greatest, max_error;
-  bool palette, parents;
+  bool palette, parents, labels = false;
 };
 constexpr Kind kinds[] = {
     {255, 0, false, false},        {255, 3, false, false},       {1, 0, false, false},
     {4095, 0, true, false},        {65535, 100, false, false},   {70000, 2, false, false},
     {0xffffffff, 0, false, false}, {0xffffffff, 0, true, false}, {255, 0, false, true},
-    {65535, 3, false, true},       {4095, 0, true, true},        {0xffffffff, 0, false, true}};
+    {65535, 3, false, true},       {4095, 0, true, true},        {0xffffffff, 0, false, true},
+    {9, 0, false, false, true},    {999, 0, false, true, true}};
 constexpr Extent sizes[] = {{8, 8, 8}, {16, 3, 2}, {1, 1, 3}, {5, 1, 4}};
 
 }  // namespace
@@ -37,6 +38,7 @@ int main(int count, char** arguments) {
     options.max_error = kind.max_error;
     options.max_sample = kind.greatest;
     options.parents = kind.parents;
+    options.labels = kind.labels;
     const uint32_t part = kind.greatest / 9;
     if (kind.palette)
       for (uint32_t i = 0; i < 10; ++i) options.values.push_back(part * i);

@@ -31,7 +31,8 @@ VolumeInfo info_of(Index3 dims, VoxelFormat format) {
 
 /// Layout packed; `number` says what is in it, and how it is cut.
 std::string packed_file(VoxelFormat format, double max_error, int number) {
-  const VolumeInfo info = info_of(number % 2 == 0 ? Index3(19, 9, 17) : Index3(7, 20, 1), format);
+  VolumeInfo info = info_of(number % 2 == 0 ? Index3(19, 9, 17) : Index3(7, 20, 1), format);
+  info.is_labels = max_error == 0 && number % 3 == 0 && !is_color(format) && format != VoxelFormat::float32;
   std::vector<std::byte> voxels;
   for (int64_t i = 0; i < info.box().voxels(); ++i) {
     const auto value = static_cast<uint16_t>(number % 3 == 0 ? i / 7 % 5 * 11 : i * i / 31 % 200 + i % 3);

@@ -11,6 +11,13 @@ THRESHOLDS = (1, 2, 3, 4, 5, 6, 7, 8, 11, 15, 20, 27, 37, 49, 67, 90, 122, 164, 
 MOST = THRESHOLDS[-1]
 CONTEXTS = [sum(t <= a for t in THRESHOLDS) for a in range(MOST + 2 * 255 + 1)]  # of an activity, in its 24
 ESCAPE = 72
+DECISIONS = (1024, 1, 2, 4, 7, 12, 20, 32, 48, 72, 104, 148, 208, 288, 392, 528,
+             700, 900, 1148, 1348, 1520, 1656, 1760, 1840, 1900, 1944, 1976, 2000, 2016, 2028, 2041, 2047)
+# Neighbours of labels, and the order in which they are asked for their names.
+ALONE = ((-1, 0, 0), (-2, 0, 0), (-1, -1, 0), (0, -1, 0), (1, -1, 0), (-1, 0, -1), (0, 0, -1), (1, 0, -1), (0, -2, 0),
+         (0, -1, -1), (0, 1, -1), (0, 0, -2))
+BESIDE = ((-1, 0, 0), (-1, -1, 0), (0, -1, 0), (1, -1, 0), (-1, 0, -1), (0, 0, -1), (0, -1, -1))
+TURNS_ALONE, TURNS_BESIDE = (0, 3, 6, 4, 2, 9, 5, 7, 10), (7, 0, 2, 5, 8, 9, 10, 1, 3, 4, 6)
 
 
 # ---- Section 5.1: the model ------------------------------------------------------------------------------------------
@@ -67,8 +74,12 @@ class Model:
     def __init__(self, data):
         bits = Bits(data)
         version = bits.get(8)
-        require(version in (1, 2), "page model: unknown version {}", version)
-        self.parents = version == 2
+        require(version in (1, 2, 3, 4), "page model: unknown version {}", version)
+        self.parents = version in (2, 4)
+        self.labels = None
+        if version > 2:
+            self.read_labels(bits, data)
+            return
         self.has_palette = bits.get(1)
         self.most, self.bound, self.background = bits.get(32), bits.golomb(0), bits.golomb(8)
         require(self.bound <= (1 << 31) - 2, "page model: bound {}", self.bound)
@@ -95,6 +106,24 @@ class Model:
         used = (bits.at + 7) // 8
         require(bits.get(8 * used - bits.at) == 0 and used == len(data), "page model: bits behind its end")
         self.palette = self.palette or range(self.most + 1)
+
+    def read_labels(self, bits, data):
+        """Section 5.4."""
+        self.most, self.background, self.bound, self.wide, self.has_palette = bits.get(16), bits.get(16), 0, False, 0
+        require(self.background <= self.most, "page model: background {} above {}", self.background, self.most)
+        self.greatest_sample, self.palette = self.most, range(self.most + 1)
+        self.value_bytes = 1 if self.most < 1 << 8 else 2
+        self.labels, count = [], 16384 if self.parents else 8192
+        while len(self.labels) < count:
+            run = bits.golomb(2)
+            require(len(self.labels) + run <= count, "page model: more than {} contexts", count)
+            self.labels += [DECISIONS[0]] * run
+            if len(self.labels) < count:
+                number = bits.get(5)
+                require(number > 0, "page model: the number of a context is 0")
+                self.labels.append(DECISIONS[number])
+        used = (bits.at + 7) // 8
+        require(bits.get(8 * used - bits.at) == 0 and used == len(data), "page model: bits behind its end")
 
     def nearest(self, sample):
         """The value that a parent has."""
@@ -240,6 +269,9 @@ def decode_page(model, page, shape, parents=None, mask=None):
         require(value <= model.most, "page: value {} above {}", value, model.most)
         return [model.palette[value]] * count
 
+    if model.labels:
+        require(mask is None, "page: a mask beside a model of labels")
+        return decode_labels(model, State(page), shape, parents)
     # Parents, then the voxels of the page.
     values = [model.nearest(sample) for sample in parents[0]] if model.parents else []
     skip, state, magnitudes = len(values), State(page), [0] * len(values)
@@ -277,3 +309,55 @@ def decode_page(model, page, shape, parents=None, mask=None):
         magnitudes.append(min(size, 255))
     require(state.value == 1 and not state.words, "page: it does not end where its voxels end")
     return [model.palette[value] for value in values[skip:]]
+
+
+# ---- Section 5.4: labels ---------------------------------------------------------------------------------------------
+
+
+def decide(state, q):
+    """Whether it is the first of two, which has q parts of 2048."""
+    rest = state.value % 2048
+    first = rest < q
+    state.value = state.value // 2048 * (q if first else 2048 - q) + (rest if first else rest - q)
+    state.renew()
+    return first
+
+
+def decode_labels(model, state, shape, parents):
+    values = {}  # by place
+
+    def parent_at(point):
+        samples, (X, Y, Z), _ = parents
+        if not (0 <= point[0] < X and 0 <= point[1] < Y and 0 <= point[2] < Z):
+            return None
+        sample = samples[(point[2] * Y + point[1]) * X + point[0]]
+        return sample if sample <= model.most else None
+
+    for z in range(shape[2]):
+        for y in range(shape[1]):
+            for x in range(shape[0]):
+                known = [values.get((x + dx, y + dy, z + dz)) for dx, dy, dz in (BESIDE if model.parents else ALONE)]
+                if model.parents:
+                    own = [c + i // 2 for c, i in zip(parents[2], (x, y, z))]
+                    known.append(parent_at(own))
+                    for axis, i in enumerate((x, y, z)):
+                        known.append(parent_at([p + (2 * (i % 2) - 1) * (a == axis) for a, p in enumerate(own)]))
+                asked = []
+                for turn in TURNS_BESIDE if model.parents else TURNS_ALONE:
+                    name = known[turn]
+                    if name is None or name in asked:
+                        continue
+                    context = sum(1 << i for i, other in enumerate(known) if other == name)
+                    if model.parents:
+                        context += (4 * (z % 2) + 2 * (y % 2) + x % 2) << 11
+                    elif asked:
+                        context += 1 << 12
+                    asked.append(name)
+                    if decide(state, model.labels[context]):
+                        break
+                else:
+                    name = min(state.take(model.most.bit_length()), model.most)
+                    state.renew()
+                values[x, y, z] = name
+    require(state.value == 1 and not state.words, "page: it does not end where its voxels end")
+    return [values[x, y, z] for z in range(shape[2]) for y in range(shape[1]) for x in range(shape[0])]

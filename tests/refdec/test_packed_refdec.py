@@ -34,7 +34,7 @@ class Models(unittest.TestCase):
     def test_rules(self):
         Model(Fields().bytes())
         self.refused("version", version=0)
-        self.refused("version", version=3)
+        self.refused("version", version=5)
         self.refused("background", background=10)
         self.refused("bound", bound=2**31 - 1)
         self.refused("palette", palette=range(10))  # and a bound
@@ -349,6 +349,23 @@ class Tools(PackedCase):
         names = [noise.choice((7, 4000000000, 65536, 12)) for _ in range(990)]
         packed, voxels = self.compare(self.encode_raw(struct.pack("<990I", *names), dims, "u32", "--labels"))
         self.assertEqual(voxels, struct.pack("<990I", *names))
+
+    def test_labels(self):
+        """Names, in patches; with and without levels, pages of both sides, few names and many."""
+        noise, dims = random.Random(5), (21, 18, 19)
+        points = [(noise.randrange(21), noise.randrange(18), noise.randrange(19)) for _ in range(40)]
+
+        def nearest(x, y, z):
+            return min(range(40), key=lambda n: sum((a - b) ** 2 for a, b in zip(points[n], (x, y, z))))
+
+        patches = [nearest(x, y, z) for z in range(19) for y in range(18) for x in range(21)]
+        for name_of, kind, width in ((lambda n: 3 * n, "u8", "B"), (lambda n: 65000 - 900 * n, "u16", "H"),
+                                     (lambda n: n * 2654435761 % 2**32, "u32", "I")):
+            data = struct.pack("<{}{}".format(len(patches), width), *map(name_of, patches))
+            for options in ((), ("--levels", "off"), ("--page", 8)):
+                packed, voxels = self.compare(self.encode_raw(data, dims, kind, "--labels", *options))
+                self.assertEqual(voxels, data)
+                self.assertTrue(packed.models[0][0].labels)
 
     def test_several_parts(self):
         """More pages than a part has, as NRRD, with a value for nothing measured."""
