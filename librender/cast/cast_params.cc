@@ -34,6 +34,10 @@ void bound_pixels(const RayGenerator& rays, const GridTransform& transform, Cast
 
 Result<CastParams> cast_params(const VolumeInfo& info, const Camera& camera, const CastOptions& options) {
   const GridTransform transform(info);
+  if (!(transform.radius() < 0x1p31 * transform.smallest_edge()))
+    return bad_input(
+        {},
+        "the edges of its voxels are too unequal: expected it to be less than 2^31 of the shortest across");
   const RayGenerator rays(camera, options.width, options.height);
   const glm::dvec3 eye = transform.point(rays.eye());
   for (int a = 0; a < 3; ++a)

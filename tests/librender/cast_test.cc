@@ -111,6 +111,21 @@ TEST(Cast, BaselineSeesNearlyTheSame) {
   EXPECT_FALSE(cast(SvmmGrid(compress("menger:3", 100, {})), camera, options, ctx));
 }
 
+/// It is the volume that is wrong, not where the camera is.
+TEST(Cast, VoxelsThatAreTooUnequalAreRefused) {
+  VolumeInfo info;
+  info.dims = Index3(4);
+  for (const double edge : {1e12, 1e-12, 1e300}) {
+    info.affine = Affine::plain({1, 1, edge}, {});
+    test::MemorySource source(info, std::vector<std::byte>(64));
+    const auto grid = dense(source);
+    Context ctx = context();
+    const auto frame = cast(*grid, Camera::orbit(30, 20, 1.8, 45), small(), ctx);
+    ASSERT_FALSE(frame);
+    EXPECT_EQ(frame.error().code, ErrorCode::input) << edge;
+  }
+}
+
 TEST(Cast, EveryBaseIsDrawnAsItIsDecoded) {
   using svmm::Base;
   for (const Base base : {Base::bitmap, Base::alpha, Base::gray, Base::bc1})
