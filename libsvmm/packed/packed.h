@@ -174,7 +174,6 @@ class PackedVolume {
 
  private:
   PackedVolume();
-  Result<Voxel> sample(Index3 voxel, int level, Ancestors& last) const;
   std::shared_ptr<const Container> container_;
   VolumeInfo info_;
   PackedParams params_;

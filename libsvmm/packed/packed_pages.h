@@ -123,7 +123,7 @@ Voxel voxel_at(const PageCache::Page& codes, Index3 at, Index3 size, const Value
 Status decode_scalars(const Container& container, const PackedPages& pages, const PackedParams& params,
                       VoxelFormat format, const Box& box, int level, VoxelSpan out);
 Result<Voxel> sample_scalar(const Container& container, const PackedPages& pages, const PackedParams& params,
-                            VoxelFormat format, Index3 voxel, int level, Ancestors& last);
+                            VoxelFormat format, Index3 voxel, int level);
 
 /// Of files of colours.
 Status decode_colors(const Container& container, const PackedPages& pages, const PackedParams& params,

@@ -44,7 +44,20 @@ static Result<const PackedVolume::Reader::Recent::Page*> recent_page(const Packe
 }
 
 Result<Voxel> PackedVolume::Reader::at(Index3 voxel) {
-  return volume_.sample(voxel, level_, recent_->ancestors);
+  const VoxelFormat format = volume_.info().format;
+  if (is_color(format))
+    return sample_color(volume_.container(), volume_.pages(), volume_.params(), voxel, level_,
+                        recent_->ancestors);
+  const PackedPages::Level& l = volume_.pages().levels[static_cast<size_t>(level_)];
+  const int log2_side = std::countr_zero(static_cast<uint64_t>(l.grid.side));
+  VOX_TRY(const Recent::Page* const page,
+          recent_page(volume_, level_, *recent_,
+                      {voxel.x >> log2_side, voxel.y >> log2_side, voxel.z >> log2_side}));
+  const ValueMap& map = volume_.params().map;
+  if (!page->codes) return voxel_of(l.model->background(), map, format);
+  return with_codes(format, [&]<class T>(T) {
+    return voxel_at<T>(*page->codes, voxel - page->box.lo, page->box.size(), map, format);
+  });
 }
 
 Result<PackedPage> PackedVolume::Reader::page(Index3 voxel) {

@@ -176,13 +176,10 @@ Status PackedVolume::decode(const Box& box, int level, VoxelSpan out) const {
 }
 
 Result<Voxel> PackedVolume::sample(Index3 voxel, int level) const {
+  if (!is_color(info_.format))
+    return sample_scalar(*container_, *pages_, params_, info_.format, voxel, level);
   Ancestors last;
-  return sample(voxel, level, last);
-}
-
-Result<Voxel> PackedVolume::sample(Index3 voxel, int level, Ancestors& last) const {
-  if (is_color(info_.format)) return sample_color(*container_, *pages_, params_, voxel, level, last);
-  return sample_scalar(*container_, *pages_, params_, info_.format, voxel, level, last);
+  return sample_color(*container_, *pages_, params_, voxel, level, last);
 }
 
 std::optional<Voxel> PackedVolume::uniform(const Box& box, int level) const {

@@ -22,7 +22,7 @@ std::shared_ptr<const PageCache::Page> PageCache::find(const Key& key) {
   const std::lock_guard lock(shard.mutex);
   const auto at = shard.places.find(key);
   if (at == shard.places.end()) return nullptr;
-  shard.entries.splice(shard.entries.begin(), shard.entries, at->second);
+  at->second->used = true;
   return at->second->page;
 }
 
@@ -34,11 +34,15 @@ void PageCache::keep(const Key& key, std::shared_ptr<const Page> page) {
   while (!shard.entries.empty() && shard.bytes + bytes > shard_limit_) drop_last(shard);
   if (bytes > shard_limit_ || !memory_.reserve(bytes, "pages that were used lately")) return;
   shard.bytes += bytes;
-  shard.entries.push_front({key, std::move(page)});
+  shard.entries.push_front({key, std::move(page), false});
   shard.places.emplace(key, shard.entries.begin());
 }
 
 void PageCache::drop_last(Shard& shard) {
+  while (shard.entries.back().used) {
+    shard.entries.back().used = false;
+    shard.entries.splice(shard.entries.begin(), shard.entries, std::prev(shard.entries.end()));
+  }
   const uint64_t bytes = shard.entries.back().page->size() + entry_bytes;
   shard.places.erase(shard.entries.back().key);
   shard.entries.pop_back();

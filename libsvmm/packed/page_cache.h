@@ -13,7 +13,8 @@
 
 namespace voxkit::svmm {
 
-/// Keeps decoded pages within a share of a memory limit, the least recently used go first. Thread-safe.
+/// Keeps decoded pages within a share of a memory limit. The oldest goes first, unless it was used since it
+/// came or was last spared, which costs a use nothing. Thread-safe.
 class PageCache {
  public:
   using Page = std::vector<std::byte>;
@@ -40,16 +41,18 @@ class PageCache {
   struct Entry {
     Key key;
     std::shared_ptr<const Page> page;
+    bool used;
   };
   /// Threads that ask for different pages seldom wait for each other.
   struct Shard {
     std::mutex mutex;
-    std::list<Entry> entries;  ///< the most recently used first
+    std::list<Entry> entries;  ///< the youngest first
     std::unordered_map<Key, std::list<Entry>::iterator, Hash> places;
     uint64_t bytes = 0;
   };
   static constexpr size_t shard_count = 16;
   Shard& shard_of(const Key& key) { return shards_[Hash()(key) >> 40 & (shard_count - 1)]; }
+  /// The oldest that was not used.
   void drop_last(Shard& shard);
 
   MemoryBudget& memory_;

@@ -2,6 +2,7 @@
 #include <array>
 #include <bit>
 #include <cstring>
+#include <glm/common.hpp>
 
 #include "libpage/page.h"
 #include "libsvmm/packed/packed_pages.h"
@@ -132,13 +133,19 @@ Status decode_scalars(const Container& container, const PackedPages& pages, cons
 }
 
 Result<Voxel> sample_scalar(const Container& container, const PackedPages& pages, const PackedParams& params,
-                            VoxelFormat format, Index3 voxel, int level, Ancestors& last) {
+                            VoxelFormat format, Index3 voxel, int level) {
   const PageGrid& grid = pages.levels[static_cast<size_t>(level)].grid;
-  const uint64_t number = grid.number(voxel / grid.side);
-  const Box box = grid.box(number);
+  const int log2_side = std::countr_zero(static_cast<uint64_t>(grid.side));
+  const Index3 page(voxel.x >> log2_side, voxel.y >> log2_side, voxel.z >> log2_side);
+  const uint64_t number = grid.number(page);
+  const Index3 lo = page << int64_t{log2_side}, size = glm::min(grid.dims - lo, Index3(grid.side));
   return with_codes(format, [&]<class T>(T) -> Result<Voxel> {
-    VOX_TRY(const auto codes, codes_of<T>(container, pages, level, number, last));
-    return voxel_at<T>(*codes, voxel - box.lo, box.size(), params.map, format);
+    auto codes = pages.cache.find({level, number});
+    if (!codes) {
+      Ancestors ancestors;
+      VOX_TRY(codes, codes_of<T>(container, pages, level, number, ancestors));
+    }
+    return voxel_at<T>(*codes, voxel - lo, size, params.map, format);
   });
 }
 

@@ -73,7 +73,8 @@ void Survey::look(ConstVoxelSpan voxels, Index3 size) {
   if (!many_floats_) {
     const auto codes = codes_of(voxels, size);
     const std::lock_guard lock(mutex_);
-    if (!many_floats_) floats_.insert(codes.begin(), codes.end());  // another thread may have found many since
+    if (!many_floats_)
+      floats_.insert(codes.begin(), codes.end());  // another thread may have found many since
     if (floats_.size() > most_floats) {
       many_floats_ = true;
       floats_.clear();
