@@ -107,7 +107,7 @@ double BoundSearch::best() const {
   const bool psnr = target_.kind == PackedTarget::Kind::psnr;
   const auto lossless = std::ranges::find(tries_, 0.0, &Try::bound);
   if (lossless != tries_.end() && lossless->excess <= 0) return 0;
-  if (finite().empty()) return tries_.back().bound;
+  if (finite().empty()) return tries_.empty() ? 0 : tries_.back().bound;  // none: no bound is possible
   const double real = bound_at(zero());
   if (!whole_) return psnr && real < least_ ? 0 : std::clamp(real, least_, most_);
   const double bound = std::clamp(psnr ? std::floor(real) : std::ceil(real), 0.0, most_),

@@ -11,11 +11,11 @@ namespace {
 constexpr uint32_t sign = 0x80000000, first_step = 3;
 constexpr double most_steps = 0x1p31;
 
-/// Half a unit in the last place of the largest values is lost when a step becomes a float, and a little in
-/// the arithmetic of doubles.
+/// Half a unit in the last place of the largest values is lost when a step becomes a float, at least half of
+/// the least float, and a little in the arithmetic of doubles.
 double rounding_of(ValueRange range) {
   const double largest = std::max(std::abs(range.lo), std::abs(range.hi));
-  return std::ldexp(largest, -24) + std::ldexp(largest, -48);
+  return std::max(std::ldexp(largest, -24), 0x1p-150) + std::ldexp(largest, -48);
 }
 
 }  // namespace

@@ -30,7 +30,7 @@ FIGURES = [
       ((PICTURES, "LeePerrySmith.obj", "dagcolor-pack", "--resolution 2048"), "percent", 1)]),
     (r"no voxel off by more than (\d+) of 255: ([\d.]+) %",
      [((PICTURES, "ch2better.nii.gz", "vq-encode", "--max-error 2 --verify"), column, 1) for column in ("max_error", "percent")]),
-    (r"Fog of an OpenVDB file: ([\d.]+) %", [((PICTURES, "smoke.vdb", "svmm-encode", "--quality 99.7"), "percent", 1)]),
+    (r"Fog of an OpenVDB file: ([\d.]+) %", [((PICTURES, "smoke.vdb", "svmm-encode", "--layout plain --quality 99.7"), "percent", 1)]),
     (r"A mesh with textures as ([\d.]+) million voxels, colours ([\d.]+) %",
      [((PICTURES, "scene.gltf", "dagcolor-pack", "--resolution 2048"), "voxels", MILLION),
       ((PICTURES, "scene.gltf", "dagcolor-pack", "--resolution 2048"), "percent", 1)]),
@@ -42,10 +42,10 @@ FIGURES = [
       ((PICTURES, "terrain:4096", "dagcolor-pack", ""), "percent", 1)]),
     (r"an eighth of its resolution, in ([\d.]+) % together",
      [((PICTURES, "engine.nii.gz", "svmm-encode", "--quality 96 --blockwidth 2 --rootwidth 16"), "percent", 1)]),
-    (r"`svmm-encode --quality 94` \(([\d.]+) %, ([\d.]+) dB\); `vq-encode --max-error 4` \(([\d.]+) %, ([\d.]+) dB\); "
+    (r"`svmm-encode --layout plain --quality 94` \(([\d.]+) %, ([\d.]+) dB\); `vq-encode --max-error 4` \(([\d.]+) %, ([\d.]+) dB\); "
      r"`vq-encode --reduce 64` \(([\d.]+) %, ([\d.]+) dB\)",
      [((PICTURES, "bonsai.nii.gz", what, setting), column, 1) for what, setting in (
-         ("svmm-encode", "--quality 94 --verify"), ("vq-encode", "--max-error 4 --verify"), ("vq-encode", "--reduce 64 --verify"))
+         ("svmm-encode", "--layout plain --quality 94 --verify"), ("vq-encode", "--max-error 4 --verify"), ("vq-encode", "--reduce 64 --verify"))
       for column in ("percent", "psnr_db")]),
     (r"`vws`, the default \(([\d.]+) %, ([\d.]+)\); `bc1` \(([\d.]+) %, ([\d.]+)\)\. Below: `vws` with a threshold of 25\.5 \(([\d.]+) %, ([\d.]+)\); "
      r"`jpeg`, quality 75 \(([\d.]+) %, ([\d.]+)\); `jp2`, quality 40 \(([\d.]+) %, ([\d.]+)\)",
@@ -54,7 +54,7 @@ FIGURES = [
     (r"at (\d+), (\d+) and (\d+) %, at (\d+), (\d+) and (\d+) %, and at (\d+), (\d+) and\s+(\d+) %",
      [((PICTURES, data, what, setting), "percent", 1) for data, what, settings in (
          ("menger:5", "svmm-encode", ("-q 100", "-q 90", "-q 80 -b bitmap -w 4")),
-         ("membrane:512,512,64:1", "svmm-encode", ("-q 100", "-q 90", "-q 70")),
+         ("membrane:512,512,64:1", "svmm-encode", ("-q 100", "--max-error 2", "--max-error 8")),
          ("marschner-lobb:128", "vq-encode", ("--lossless", "--max-error 256", "--reduce 16"))) for setting in settings]),
 ]
 
@@ -64,17 +64,17 @@ def bits(rows, section, what, setting):
 
 
 def smaller_for_scans(rows):
-    """vq-encode's files of the scans beside svmm-encode's, lossless and with the same bound."""
+    """vq-encode's files of the scans beside those of sparse mip-maps, lossless and with the same bound."""
     def size(section, data, what, known):
         return min(int(row["bytes"]) for (s, d, w, setting), row in rows.items() if (s, d, w) == (section, data, what) and known in setting)
-    return all(size("lossless", data, "vq-encode", "") < size("lossless", data, "svmm-encode", "") and
-               size("bounded", data, "vq-encode", "--max-error") < size("bounded", data, "svmm-encode", "--delta")
+    return all(size("lossless", data, "vq-encode", "") < size("lossless", data, "svmm-encode", "-w 0") and
+               size("bounded", data, "vq-encode", "--max-error") < size("bounded", data, "svmm-encode", "-w 0")
                for data in ("skull", "ch2better"))
 
 
 def smaller(rows):
-    """Bits a voxel of the CT, from svmm-encode's lossless file to that of k-means."""
-    svmm, vq = bits(rows, "lossless", "svmm-encode", "-q 100"), bits(rows, "lossless", "vq-encode", "")
+    """Bits a voxel of the CT, from the lossless sparse mip-map to the file of k-means."""
+    svmm, vq = bits(rows, "lossless", "svmm-encode", "-q 100 -w 0"), bits(rows, "lossless", "vq-encode", "")
     return svmm > 2 * vq and vq > bits(rows, "bounded", "vq-encode", "--max-error 40") > bits(rows, "small", "vq-encode", "--reduce 16")
 
 

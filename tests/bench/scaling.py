@@ -29,6 +29,7 @@ ROUNDS = 2
 THREADS = (1, 2)
 LIMIT = "128M"
 FIELDS = ("row", "input", "voxels", "moved_bytes", "threads", "max_memory", "round", "wall_s", "cpu_s", "rss_bytes", "mapped_bytes", "load")
+BLOCKS = {"svmm-encode": ("--layout", "plain")}  # whose sizes and times are those of bytes that are moved
 ENDINGS = {"svmm-encode": ".svmm", "vq-encode": ".vqv", "dagcolor-pack": ".dagc"}
 SURFACE_VOXEL = 16  # bytes, as they come from where they are made
 
@@ -74,7 +75,7 @@ class Bench:
         path = self.folder / (name.replace(":", "-") + ENDINGS[encoder])
         if not path.exists():
             part = path.with_suffix(".part")
-            self.run([encoder, name, "-o", "-", "--quiet"], part)
+            self.run([encoder, name, "-o", "-", "--quiet", *BLOCKS.get(encoder, ())], part)
             part.rename(path)
         return path
 
@@ -92,7 +93,7 @@ class Bench:
     def measure(self, series, name, threads, turn, limit="", keep=True):
         """A run; where the output is too large to be made just to be counted, not `keep`."""
         words = [series.tool, *([name] if series.before else []), *([self.made(name, series.encoder)] if series.file else []),
-                 *series.options, "--quiet", "--threads", threads, *(["--max-memory", limit] if limit else [])]
+                 *series.options, *BLOCKS.get(series.tool, ()), "--quiet", "--threads", threads, *(["--max-memory", limit] if limit else [])]
         wall, cpu, rss = self.run(words)
         mapped = self.made(name, series.encoder).stat().st_size if series.file else 0
         self.rows.append({"row": series.label, "input": name, "voxels": self.voxels(name),

@@ -199,10 +199,14 @@ Result<Input> open_input(const std::string& name, const OpenOptions& options, Co
   const VolumeInfo& info = input.source->info();
   if (options.fill && is_color(info.format))
     return bad_usage(fmt::format("--fill: voxels are {}: expected scalars", voxkit::name(info.format)));
-  const auto fill =
-      options.fill
-          ? std::optional(info.format == VoxelFormat::float32 ? *options.fill : info.stored(*options.fill))
-          : info.fill;
+  auto fill = info.fill;
+  if (options.fill) fill = info.format == VoxelFormat::float32 ? *options.fill : info.stored(*options.fill);
+  // A table has the values that there are, and only these.
+  if (options.fill && info.labels && info.sample(*fill) != *options.fill) {
+    ctx.note(fmt::format("--fill {}: no voxel has this value: there is none that stands for nothing measured",
+                         *options.fill));
+    fill = std::nullopt;
+  }
   if (fill) input.source = with_fill(std::move(input.source), *fill);
   return input;
 }
