@@ -156,15 +156,16 @@ Status read_placement(const Header& header, const std::string& name, const std::
 
 /// The order of columns, rows and sections; three zeros, in old files, say nothing.
 Result<std::array<int, 3>> read_axes(const Header& header, const std::string& name) {
-  std::array<int, 3> axes{};
-  for (size_t k = 0; k < 3; ++k) axes[k] = header.get<int32_t>(at_axes + 4 * k) - 1;
-  if (axes == std::array<int, 3>{-1, -1, -1}) return std::array<int, 3>{0, 1, 2};
-  auto sorted = axes;
+  std::array<int32_t, 3> said{};
+  for (size_t k = 0; k < 3; ++k) said[k] = header.get<int32_t>(at_axes + 4 * k);
+  if (said == std::array<int32_t, 3>{0, 0, 0}) return std::array<int, 3>{0, 1, 2};
+  auto sorted = said;
   std::sort(sorted.begin(), sorted.end());
-  if (sorted == std::array<int, 3>{0, 1, 2}) return axes;
+  if (sorted == std::array<int32_t, 3>{1, 2, 3})
+    return std::array<int, 3>{said[0] - 1, said[1] - 1, said[2] - 1};
   return bad_input(
       name, fmt::format("MRC header: axis order {},{},{} at byte {}: expected 1, 2 and 3 in some order",
-                        int64_t{axes[0]} + 1, int64_t{axes[1]} + 1, int64_t{axes[2]} + 1, size_t{at_axes}));
+                        said[0], said[1], said[2], size_t{at_axes}));
 }
 
 void read_texts(const Header& header, const std::string& name, int32_t extended, Map& map, Context& ctx) {

@@ -158,6 +158,7 @@ TEST_F(MrcTest, HeaderErrorsSayWhatIsExpected) {
   refuse([](Header& h) { h.set(92, int32_t{-80}); }, "-80 bytes of extended header");
   refuse([](Header& h) { h.set(64, int32_t{3}); },
          "axis order 3,2,3 at byte 64: expected 1, 2 and 3 in some order");
+  refuse([](Header& h) { h.set(64, INT32_MIN); }, "axis order -2147483648,2,3 at byte 64");
   refuse([](Header& h) { h.bytes[208] = 'X', h.set(40, -1.0f); },
          "not an MRC file: expected MAP at byte 208");
   refuse([](Header& h) { h.bytes[208] = 'X', h.set(12, int32_t{77}); }, "not an MRC file");
