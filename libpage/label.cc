@@ -59,8 +59,8 @@ constexpr std::array alone_turns = {0, 3, 6, 4, 2, 9, 5, 7, 10};
 constexpr std::array places_with_parents = {-1, -1 - row, -row, 1 - row, -1 - plane, -plane, -row - plane};
 constexpr std::array turns_with_parents = {7, 0, 2, 5, 8, 9, 10, 1, 3, 4, 6};
 
-/// Calls coder.decide(context, name, values) for each name until it is the voxel's, else coder.name(), for
-/// all voxels in order. What the coder returns is what a voxel is.
+/// Calls coder.decide(at, context, name) for each name until it is that of voxel number `at`, else
+/// coder.name(at), which returns it, for all voxels in order.
 template <bool with_parents, class Coder>
 void visit(Extent extent, const Parents* parents, Coder& coder) {
   constexpr size_t near = with_parents ? places_with_parents.size() : alone_places.size(),

@@ -260,8 +260,8 @@ Result<int> work(const Options& o, Run& run) {
         "--max-error, --target-psnr, --target-bpv, --levels, --page: of --layout packed only{}",
         o.layout.empty() ? ", which has no --blockwidth, --rootwidth, --base, --bound, --alpha-weight, --zstd"
                          : ""));
-  VOX_TRY(auto source,
-          inputs.open(o.verify || (o.delta.value_or(100 - o.quality.value_or(90)) > 0 && !o.range)));
+  const bool may_lose = o.delta ? *o.delta > 0 : o.quality.value_or(90) < 100;
+  VOX_TRY(auto source, inputs.open(o.verify || (may_lose && !o.range)));
   VOX_TRY(svmm::Params params, params_of(o, source->info()));
   VOX_CHECK(svmm::validate(params, source->info()));
   const VoxelFormat format = source->info().format;

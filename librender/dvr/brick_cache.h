@@ -72,10 +72,9 @@ std::unique_ptr<BrickReader<T>> brick_reader(std::shared_ptr<const svmm::Volume>
 template <class T>
 std::unique_ptr<BrickReader<T>> brick_reader(std::shared_ptr<const vq::Volume> volume,
                                              const TransferFunction* shown);
-/// Of scalars, from pages. `info`: of the finest level that is there. (packed_brick_reader.cc)
+/// Of scalars, from pages of the finest level that is there. (packed_brick_reader.cc)
 template <class T>
-std::unique_ptr<BrickReader<T>> brick_reader(std::shared_ptr<const svmm::PackedVolume> volume,
-                                             const VolumeInfo& info);
+std::unique_ptr<BrickReader<T>> brick_reader(std::shared_ptr<const svmm::PackedVolume> volume);
 
 inline Index3 bricks_of(const VolumeInfo& info) {
   return (info.dims + Index3(vq::brick_edge - 1)) / Index3(vq::brick_edge);

@@ -29,7 +29,7 @@ Status draw_bricks(const DvrVolume& volume, const DvrJob& job, Frame& frame, Con
     }
     return std::make_unique<BrickCache<T>>(volume.vq()       ? brick_reader<T>(volume.vq(), job.shown)
                                            : volume.svmm()   ? brick_reader<T>(volume.svmm())
-                                           : volume.packed() ? brick_reader<T>(volume.packed(), volume.info())
+                                           : volume.packed() ? brick_reader<T>(volume.packed())
                                                              : brick_reader<T>(volume.dense()));
   };
   VOX_CHECK(over_tiles(job.params, frame, ctx, [&](const DvrTile& tile, DvrCounts& count) -> Status {

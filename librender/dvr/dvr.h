@@ -17,7 +17,7 @@ class DvrVolume {
   static Result<DvrVolume> open(std::shared_ptr<const DenseGrid> grid, Context& ctx);
   static Result<DvrVolume> open(std::shared_ptr<const svmm::Volume> volume, Context& ctx);
   static Result<DvrVolume> open(std::shared_ptr<const vq::Volume> volume, Context& ctx);
-  /// The finest level that is there. Decodes every page once, and again where a picture needs them.
+  /// The finest level that is there. Decodes every coded page once, and again where a picture needs them.
   static Result<DvrVolume> open(std::shared_ptr<const svmm::PackedVolume> volume, Context& ctx);
 
   const VolumeInfo& info() const { return info_; }

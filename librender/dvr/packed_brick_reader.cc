@@ -12,10 +12,10 @@ namespace {
 template <class T>
 class PackedReader final : public BrickReader<T> {
  public:
-  PackedReader(std::shared_ptr<const svmm::PackedVolume> volume, const VolumeInfo& info)
-      : BrickReader<T>(bricks_of(info)),
+  explicit PackedReader(std::shared_ptr<const svmm::PackedVolume> volume)
+      : BrickReader<T>(bricks_of(volume->info_of(volume->finest()))),
         volume_(std::move(volume)),
-        box_(info.box()),
+        box_(volume_->info_of(volume_->finest()).box()),
         reader_(*volume_, volume_->finest()) {}
 
   void read(uint32_t x, uint32_t y, uint32_t z, T* values) override {
@@ -56,13 +56,10 @@ class PackedReader final : public BrickReader<T> {
 }  // namespace
 
 template <class T>
-std::unique_ptr<BrickReader<T>> brick_reader(std::shared_ptr<const svmm::PackedVolume> volume,
-                                             const VolumeInfo& info) {
-  return std::make_unique<PackedReader<T>>(std::move(volume), info);
+std::unique_ptr<BrickReader<T>> brick_reader(std::shared_ptr<const svmm::PackedVolume> volume) {
+  return std::make_unique<PackedReader<T>>(std::move(volume));
 }
-template std::unique_ptr<BrickReader<uint16_t>> brick_reader(std::shared_ptr<const svmm::PackedVolume>,
-                                                             const VolumeInfo&);
-template std::unique_ptr<BrickReader<float>> brick_reader(std::shared_ptr<const svmm::PackedVolume>,
-                                                          const VolumeInfo&);
+template std::unique_ptr<BrickReader<uint16_t>> brick_reader(std::shared_ptr<const svmm::PackedVolume>);
+template std::unique_ptr<BrickReader<float>> brick_reader(std::shared_ptr<const svmm::PackedVolume>);
 
 }  // namespace voxkit::render

@@ -3,15 +3,9 @@
 from functools import lru_cache
 
 from container import require
-from page_decode import Bits, State
+from page_decode import ALONE, BESIDE, Bits, State, decide, read_decisions
 
 CONTEXTS = 8192
-SOLID = (1024, 1, 2, 4, 7, 12, 20, 32, 48, 72, 104, 148, 208, 288, 392, 528,
-         700, 900, 1148, 1348, 1520, 1656, 1760, 1840, 1900, 1944, 1976, 2000, 2016, 2028, 2041, 2047)
-# The voxels that a context looks at, from bit 0 on.
-ALONE = ((-1, 0, 0), (-2, 0, 0), (-1, -1, 0), (0, -1, 0), (1, -1, 0), (-1, 0, -1), (0, 0, -1), (1, 0, -1), (0, -2, 0),
-         (0, -1, -1), (0, 1, -1), (0, 0, -2))
-BESIDE = ((-1, 0, 0), (-1, -1, 0), (0, -1, 0), (1, -1, 0), (-1, 0, -1), (0, 0, -1), (0, -1, -1))
 
 
 class MaskModel:
@@ -20,17 +14,7 @@ class MaskModel:
         version = bits.get(8)
         require(version in (1, 2), "mask model: unknown version {}", version)
         self.parents = version == 2
-        self.solid = []  # of each context, of 2048
-        while len(self.solid) < CONTEXTS:
-            run = bits.golomb(2)
-            require(len(self.solid) + run <= CONTEXTS, "mask model: more than {} contexts", CONTEXTS)
-            self.solid += [SOLID[0]] * run
-            if len(self.solid) < CONTEXTS:
-                number = bits.get(5)
-                require(number > 0, "mask model: the number of a context is 0")
-                self.solid.append(SOLID[number])
-        used = (bits.at + 7) // 8
-        require(bits.get(8 * used - bits.at) == 0 and used == len(data), "mask model: bits behind its end")
+        self.solid = read_decisions(bits, CONTEXTS, "mask model")  # of each context, of 2048
 
 
 @lru_cache(maxsize=64)
@@ -75,10 +59,7 @@ def decode_mask(model, page, shape, parents=None):
     for possible, (_, context, own, above) in zip(may, where):
         if possible:
             context += sum(bit for at, bit in own if mask[at]) + sum(bit for at, bit in above if parents[0][at])
-            q, rest = model.solid[context], state.value % 2048
-            solid = rest < q
-            state.value = state.value // 2048 * (q if solid else 2048 - q) + (rest if solid else rest - q)
-            state.renew()
+            solid = decide(state, model.solid[context])
         mask.append(possible and solid)
     require(state.value == 1 and not state.words, "mask: it does not end where its voxels end")
     return mask

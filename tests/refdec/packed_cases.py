@@ -8,9 +8,9 @@ import subprocess
 
 from container import Container, Refused
 from helpers import BIN, ToolCase, container, raw_file, read, write
-from mask_decode import CONTEXTS, SOLID
+from mask_decode import CONTEXTS
 from packed_decode import Packed, decode
-from page_decode import counts, lacks, rest_tap
+from page_decode import DECISIONS, counts, lacks, rest_tap
 
 
 # ---- Writers ---------------------------------------------------------------------------------------------------------
@@ -104,7 +104,7 @@ class MaskFields:
         """A mask page, as section 5.3 has it backwards: of each voxel that may be solid its context, and if it is."""
         state, words = 1, b""
         for context, is_solid in reversed(solid):
-            q = SOLID[self.numbers.get(context, 0)]
+            q = DECISIONS[self.numbers.get(context, 0)]
             part, first = (q, 0) if is_solid else (2048 - q, q)
             if state << 11 >= part << 64:
                 words += struct.pack("<I", state & 0xffffffff)

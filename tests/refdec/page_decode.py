@@ -50,6 +50,22 @@ class Bits:
         return -(g + 1) // 2 if g % 2 else g // 2
 
 
+def read_decisions(bits, count, name):
+    """Of each of so many contexts its parts of 2048, to the end of a model (section 5.3)."""
+    parts = []
+    while len(parts) < count:
+        run = bits.golomb(2)
+        require(len(parts) + run <= count, "{}: more than {} contexts", name, count)
+        parts += [DECISIONS[0]] * run
+        if len(parts) < count:
+            number = bits.get(5)
+            require(number > 0, "{}: the number of a context is 0", name)
+            parts.append(DECISIONS[number])
+    used = (bits.at + 7) // 8
+    require(bits.get(8 * used - bits.at) == 0 and used == len(bits.data), "{}: bits behind its end", name)
+    return parts
+
+
 def counts(parents):
     """Of classes, taps and tables."""
     return (48, 30, 192) if parents else (18, 16, 72)
@@ -78,7 +94,7 @@ class Model:
         self.parents = version in (2, 4)
         self.labels = None
         if version > 2:
-            self.read_labels(bits, data)
+            self.read_labels(bits)
             return
         self.has_palette = bits.get(1)
         self.most, self.bound, self.background = bits.get(32), bits.golomb(0), bits.golomb(8)
@@ -107,23 +123,13 @@ class Model:
         require(bits.get(8 * used - bits.at) == 0 and used == len(data), "page model: bits behind its end")
         self.palette = self.palette or range(self.most + 1)
 
-    def read_labels(self, bits, data):
+    def read_labels(self, bits):
         """Section 5.4."""
         self.most, self.background, self.bound, self.wide, self.has_palette = bits.get(16), bits.get(16), 0, False, 0
         require(self.background <= self.most, "page model: background {} above {}", self.background, self.most)
         self.greatest_sample, self.palette = self.most, range(self.most + 1)
         self.value_bytes = 1 if self.most < 1 << 8 else 2
-        self.labels, count = [], 16384 if self.parents else 8192
-        while len(self.labels) < count:
-            run = bits.golomb(2)
-            require(len(self.labels) + run <= count, "page model: more than {} contexts", count)
-            self.labels += [DECISIONS[0]] * run
-            if len(self.labels) < count:
-                number = bits.get(5)
-                require(number > 0, "page model: the number of a context is 0")
-                self.labels.append(DECISIONS[number])
-        used = (bits.at + 7) // 8
-        require(bits.get(8 * used - bits.at) == 0 and used == len(data), "page model: bits behind its end")
+        self.labels = read_decisions(bits, 16384 if self.parents else 8192, "page model")
 
     def nearest(self, sample):
         """The value that a parent has."""
