@@ -1,8 +1,9 @@
 #include <algorithm>
 
-#include "libpage/encode_kernel.h"
 #include "libpage/page.h"
 #include "libpage/rans.h"
+#include "libpage/residuals.h"
+#include "libpage/row.h"
 
 namespace voxkit::page {
 namespace {
@@ -50,7 +51,7 @@ Status encode(const Model& shared, std::span<const T> samples, Extent extent, st
   std::ranges::copy(samples, values.begin());
   const std::span<uint32_t> page(values.data(), samples.size());
   if (mask) fill_void(*mask, extent, page);
-  if (!number(model.palette, page))
+  if (!model.number(page))
     return bad_usage("a sample that the palette of the model lacks: expected all values when it was made");
   const auto range = std::ranges::minmax(page);
   const uint32_t least = range.min, greatest = range.max;
@@ -78,13 +79,11 @@ Status encode(const Model& shared, std::span<const T> samples, Extent extent, st
   }
   Residuals residuals;
   std::array<uint32_t, max_voxels> lossy;
-  if (model.wide()) {
-    find_residuals<Wide>(model, page, extent, parent, mask, residuals, lossy.data());
+  find_residuals(model, page, extent, parent, mask, residuals, lossy.data());
+  if (model.wide())
     write_residuals<Wide>(model, residuals, out);
-  } else {
-    find_residuals<Narrow>(model, page, extent, parent, mask, residuals, lossy.data());
+  else
     write_residuals<Narrow>(model, residuals, out);
-  }
   tell([&](size_t i) { return lossy[i]; });
   return {};
 }

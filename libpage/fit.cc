@@ -5,6 +5,7 @@
 #include <cmath>
 
 #include "formats/cpu.h"
+#include "formats/parallel.h"
 #include "libpage/parent_rows.h"
 
 namespace voxkit::page {
@@ -143,65 +144,73 @@ class Surroundings {
 
 }  // namespace
 
-/// Equations of a class that are added together, one after the other.
-struct Fit::Batch {
+/// Equations of a class that are added together, one after the other, to sums of floats, and these after so
+/// many, while they are as good as exact, to sums of doubles.
+struct Fit::Pending {
   static constexpr size_t most = 4;
+  static constexpr int most_batches = 64;
   size_t count = 0;
-  alignas(64) std::array<Row, most> taps;
-  std::array<double, most> weight, target;
+  int batches = 0;
+  alignas(64) std::array<Row<float>, most> taps;
+  std::array<float, most> weight;
+  Sums<float> sums;
 
-  /// To `sums`, of the first `known` taps. Each sum is of its own, so that vectors change nothing.
-  template <size_t equations>
-  [[gnu::always_inline]] inline void add_all(Equations& sums, size_t known) const {
-    constexpr size_t width = 4;
+  /// Of `known` taps and the sample. Each sum is of its own, so that vectors change nothing.
+  template <size_t equations, size_t known>
+  [[gnu::always_inline]] inline void add_all() {
+    constexpr size_t width = 8;
     for (size_t i = 0; i < known; ++i) {
-      double weighted[equations];
+      float weighted[equations];
       for (size_t e = 0; e < equations; ++e) weighted[e] = weight[e] * taps[e][i];
-      for (size_t e = 0; e < equations; ++e) sums.targets[i] += weighted[e] * target[e];
       auto& row = sums.products[i];
-      for (size_t j = i / width * width; j < known; j += width)
+      for (size_t j = i / width * width; j < known + 1; j += width)
         for (size_t k = 0; k < width; ++k) {
-          double sum = row[j + k];
+          float sum = row[j + k];
           for (size_t e = 0; e < equations; ++e) sum += weighted[e] * taps[e][j + k];
           row[j + k] = sum;
         }
     }
   }
-  [[gnu::always_inline]] inline void add_to(Equations& sums, size_t known) {
-    switch (count) {
-      case 4:
-        add_all<4>(sums, known);
-        break;
-      case 3:
-        add_all<3>(sums, known);
-        break;
-      case 2:
-        add_all<2>(sums, known);
-        break;
-      case 1:
-        add_all<1>(sums, known);
-    }
+  template <size_t known>
+  [[gnu::always_inline]] inline void add_batch(Equations& total) {
+    if (count == most)
+      add_all<most, known>();
+    else
+      for (size_t e = 0; e < count; ++e) {
+        std::swap(taps[0], taps[e]);
+        std::swap(weight[0], weight[e]);
+        add_all<1, known>();
+      }
     count = 0;
+    if (++batches == most_batches) flush(total);
+  }
+  void flush(Equations& total) {
+    for (size_t i = 0; i < tap_count; ++i)
+      for (size_t j = 0; j < row_width; ++j) total.products[i][j] += static_cast<double>(sums.products[i][j]);
+    sums = {};
+    batches = 0;
   }
 };
 
+template <bool parents>
 [[gnu::always_inline]] inline void Fit::add_page(const FitPage& page, int share, int turn,
                                                  std::vector<Equations>& all,
-                                                 std::vector<Batch>& batches) const {
+                                                 std::vector<Pending>& pending) const {
   const Extent e = page.extent;
   const Surroundings around(page, shift_);
-  const auto count = static_cast<size_t>(taps_of(classes_.parents));
+  constexpr auto count = static_cast<size_t>(taps_of(parents));
+  constexpr Classes classes{parents};
   size_t at = 0;
   for (int z = 0; z < e.nz; ++z)
     for (int y = 0; y < e.ny; ++y)
       for (int x = 0; x < e.nx; ++x, ++at) {
         if (page.mask ? !page.mask->solid(x, y, z) : (x / 2 + y / 2 + z / 2 + turn) % share != 0) continue;
         const auto voxel_class =
-            static_cast<size_t>(classes_.of(classes_.along(x, e.nx), classes_.along(y, e.ny), z));
+            static_cast<size_t>(classes.of(classes.along(x, e.nx), classes.along(y, e.ny), z));
         const ClassTaps& known = class_taps_[voxel_class];
         if (known.rest < 0) continue;
         alignas(64) std::array<int32_t, row_width> taps;
-        around.taps(x, y, z, classes_.parents, taps);
+        around.taps(x, y, z, parents, taps);
         const int32_t origin = taps[static_cast<size_t>(known.rest)];
         int32_t least = 0, greatest = 0;
         for (size_t t = 0; t < count; ++t) {
@@ -214,61 +223,77 @@ struct Fit::Batch {
         Equations& sums = all[voxel_class];
         sums.weight += weight;
         if (range == 0) continue;
-        Batch& batch = batches[voxel_class];
-        Row& row = batch.taps[batch.count];
-        for (size_t t = 0; t < count; ++t) row[t] = static_cast<double>(taps[t]);
-        for (size_t t = count; t < row_width; ++t) row[t] = 0;
-        batch.weight[batch.count] = weight;
-        batch.target[batch.count] =
-            static_cast<double>(static_cast<int32_t>(page.samples[at] >> shift_) - origin);
-        if (++batch.count == Batch::most) batch.add_to(sums, count);
+        Pending& batch = pending[voxel_class];
+        Row<float>& row = batch.taps[batch.count];
+        for (size_t t = 0; t < count; ++t) row[t] = static_cast<float>(taps[t]);
+        row[count] = static_cast<float>(static_cast<int32_t>(page.samples[at] >> shift_) - origin);
+        for (size_t t = count + 1; t < row_width; ++t) row[t] = 0;
+        batch.weight[batch.count] = static_cast<float>(weight);
+        if (++batch.count == Pending::most) batch.add_batch<count>(sums);
       }
 }
 
-[[gnu::always_inline]] inline void Fit::add_pages(std::span<const FitPage> pages,
-                                                  std::vector<Equations>& sums,
-                                                  std::vector<Batch>& batches) const {
+template <bool parents>
+[[gnu::always_inline]] inline void Fit::add_pages(std::span<const FitPage> all, size_t first, size_t last,
+                                                  std::vector<Equations>& sums) const {
   // Of many pages, some of their cubes of 2^3 voxels give equations enough.
-  const int share = pages.size() < 256 ? 1 : pages.size() < 384 ? 2 : 3;
-  int turn = 0;
-  for (const FitPage& page : pages) add_page(page, share, turn++, sums, batches);
-  for (size_t c = 0; c < sums.size(); ++c)
-    batches[c].add_to(sums[c], static_cast<size_t>(taps_of(classes_.parents)));
+  const int share = all.size() < 256 ? 1 : all.size() < 384 ? 2 : 3;
+  std::vector<Pending> pending(sums.size());
+  for (size_t i = first; i < last; ++i) add_page<parents>(all[i], share, static_cast<int>(i), sums, pending);
+  for (size_t c = 0; c < sums.size(); ++c) {
+    pending[c].add_batch<static_cast<size_t>(taps_of(parents))>(sums[c]);
+    pending[c].flush(sums[c]);
+  }
 }
-void Fit::add_pages_anywhere(std::span<const FitPage> pages, std::vector<Equations>& sums,
-                             std::vector<Batch>& batches) const {
-  add_pages(pages, sums, batches);
+void Fit::add_pages_anywhere(std::span<const FitPage> all, size_t first, size_t last,
+                             std::vector<Equations>& sums) const {
+  classes_.parents ? add_pages<true>(all, first, last, sums) : add_pages<false>(all, first, last, sums);
 }
 #ifdef VOXKIT_AVX2
-VOXKIT_AVX2_CODE void Fit::add_pages_avx2(std::span<const FitPage> pages, std::vector<Equations>& sums,
-                                          std::vector<Batch>& batches) const {
-  add_pages(pages, sums, batches);
+VOXKIT_AVX2_CODE void Fit::add_pages_avx2(std::span<const FitPage> all, size_t first, size_t last,
+                                          std::vector<Equations>& sums) const {
+  classes_.parents ? add_pages<true>(all, first, last, sums) : add_pages<false>(all, first, last, sums);
 }
 #endif
 
-void Fit::add(std::span<const FitPage> pages, double noise) {
+Status Fit::add(std::span<const FitPage> pages, double noise, const Context& ctx) {
   for (int i = 0; i < shift_; ++i) noise /= 4;
-  std::vector<Equations> sums(equations_.size());
-  std::vector<Batch> batches(equations_.size());
+  constexpr size_t parts = 8;
+  std::array<std::vector<Equations>, parts> sums;
+  VOX_CHECK(parallel_for(ctx, parts, [&](int64_t i) -> Status {
+    const auto part = static_cast<size_t>(i);
+    const size_t first = pages.size() * part / parts, last = pages.size() * (part + 1) / parts;
+    if (first == last) return {};
+    sums[part].resize(equations_.size());
 #ifdef VOXKIT_AVX2
-  if (has_avx2())
-    add_pages_avx2(pages, sums, batches);
-  else
+    if (has_avx2()) {
+      add_pages_avx2(pages, first, last, sums[part]);
+      return {};
+    }
 #endif
-    add_pages_anywhere(pages, sums, batches);
-  for (size_t c = 0; c < sums.size(); ++c) {
+    add_pages_anywhere(pages, first, last, sums[part]);
+    return {};
+  }));
+  const auto sample = static_cast<size_t>(taps_of(classes_.parents));
+  for (size_t c = 0; c < equations_.size(); ++c) {
     Equations& total = equations_[c];
-    const double own = noise * sums[c].weight;
+    const auto add = [&](auto member) {
+      double sum = 0;
+      for (const std::vector<Equations>& part : sums)
+        if (!part.empty()) sum += member(part[c]);
+      return sum;
+    };
+    const double weight = add([](const Equations&part) { return part.weight; }), own = noise * weight;
     // Of two taps' differences from a third, the noise is twice that of one, and once in common.
     const double common = classes_.parents ? 0 : own;
-    for (size_t i = 0; i < tap_count; ++i) {
-      for (size_t j = i; j < tap_count; ++j)
-        total.products[i][j] =
-            total.products[i][j] / 2 + sums[c].products[i][j] + common + (i == j && i < parent_tap ? own : 0);
-      total.targets[i] = total.targets[i] / 2 + sums[c].targets[i] + common;
-    }
-    total.weight = total.weight / 2 + sums[c].weight;
+    for (size_t i = 0; i < sample; ++i)
+      for (size_t j = i; j <= sample; ++j)
+        total.products[i][j] = total.products[i][j] / 2 +
+                               add([&](const Equations& part) { return part.products[i][j]; }) + common +
+                               (i == j && i < parent_tap ? own : 0);
+    total.weight = total.weight / 2 + weight;
   }
+  return {};
 }
 
 std::array<Weights, most_classes> Fit::weights() const {
@@ -293,15 +318,15 @@ Weights Fit::solve(const Equations& equations, int voxel_class) const {
   // parent of noise may be, all are held back more; without parents, such are of no use.
   const double most_damping = classes_.parents ? 1 : 1.0 / 4096;
   for (double damping = 1.0 / 4096; damping <= most_damping; damping *= 4) {
-    std::array<Row, tap_count> a;
-    Row b;
+    std::array<Row<double>, tap_count> a;
+    Row<double> b;
     for (size_t i = 0; i < n; ++i) {
       for (size_t j = 0; j <= i; ++j) {
         const auto [row, column] = std::minmax(taps[i], taps[j]);
         a[i][j] = equations.products[row][column];
       }
       a[i][i] += a[i][i] * damping + equations.weight / 1024 + 1e-3;
-      b[i] = equations.targets[taps[i]];
+      b[i] = equations.products[taps[i]][static_cast<size_t>(taps_of(classes_.parents))];
     }
     if (!solve_definite(a, b, n)) continue;
     if (round_weights(std::span(taps).first(n), b, rest, weights)) break;

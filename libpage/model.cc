@@ -41,6 +41,15 @@ bool read_weights(BitReader& in, Weights& weights, Classes classes, int voxel_cl
   return true;
 }
 
+/// The number of the entry next to a sample, the lower one of two.
+uint32_t search_nearest(std::span<const uint32_t> palette, uint32_t sample) {
+  const auto at = std::ranges::lower_bound(palette, sample);
+  const auto number = static_cast<uint32_t>(at - palette.begin());
+  if (at == palette.begin()) return 0;
+  if (at == palette.end()) return number - 1;
+  return sample - *(at - 1) <= *at - sample ? number - 1 : number;
+}
+
 }  // namespace
 
 void ModelData::derive() {
@@ -64,21 +73,27 @@ void ModelData::set_weights(const std::array<Weights, most_classes>& fitted) {
             weights[4 * row + static_cast<size_t>(classes.along(static_cast<int>(x), max_side))][t];
 }
 
-uint32_t ModelData::nearest(uint32_t sample) const {
-  if (palette.empty()) return std::min(sample, max_value);
-  const auto at = std::ranges::lower_bound(palette, sample);
-  const auto number = static_cast<uint32_t>(at - palette.begin());
-  if (at == palette.begin()) return 0;
-  if (at == palette.end()) return number - 1;
-  return sample - *(at - 1) <= *at - sample ? number - 1 : number;
+void ModelData::set_palette(std::vector<uint32_t> ascending) {
+  palette = std::move(ascending);
+  numbers.clear();
+  if (palette.empty() || palette.back() > 0xffff) return;
+  numbers.reserve(size_t{palette.back()} + 1);
+  for (uint32_t sample = 0; sample <= palette.back(); ++sample)
+    numbers.push_back(static_cast<uint16_t>(search_nearest(palette, sample)));
 }
 
-bool number(std::span<const uint32_t> palette, std::span<uint32_t> samples) {
+uint32_t ModelData::nearest(uint32_t sample) const {
+  if (palette.empty()) return std::min(sample, max_value);
+  if (!numbers.empty()) return sample < numbers.size() ? numbers[sample] : max_value;
+  return search_nearest(palette, sample);
+}
+
+bool ModelData::number(std::span<uint32_t> samples) const {
   if (palette.empty()) return true;
   for (uint32_t& sample : samples) {
-    const auto at = std::ranges::lower_bound(palette, sample);
-    if (at == palette.end() || *at != sample) return false;
-    sample = static_cast<uint32_t>(at - palette.begin());
+    const uint32_t at = nearest(sample);
+    if (palette[at] != sample) return false;
+    sample = at;
   }
   return true;
 }
@@ -148,12 +163,14 @@ Result<Model> Model::parse(std::span<const std::byte> bytes) {
     if (m.max_error != 0 || m.max_value > 0xffff)
       return wrong("palette: expected at most 65536 entries, and no error");
     uint64_t next = 0;
+    std::vector<uint32_t> palette;
     for (uint32_t i = 0; i <= m.max_value; ++i) {
       const uint64_t value = next + in.golomb(palette_golomb);
       if (in.overrun() || value > UINT32_MAX) return wrong("palette: expected ascending values of 32 bits");
-      m.palette.push_back(static_cast<uint32_t>(value));
+      palette.push_back(static_cast<uint32_t>(value));
       next = value + 1;
     }
+    m.set_palette(std::move(palette));
   }
   for (int c = 0; c < m.classes.count(); ++c)
     if (!read_weights(in, m.weights[static_cast<size_t>(c)], m.classes, c) || in.overrun())

@@ -3,10 +3,13 @@
 #include <functional>
 #include <limits>
 #include <map>
+#include <mutex>
 
-#include "libpage/encode_kernel.h"
+#include "formats/parallel.h"
 #include "libpage/fit.h"
 #include "libpage/page.h"
+#include "libpage/parent_rows.h"
+#include "libpage/residuals.h"
 
 namespace voxkit::page {
 namespace {
@@ -15,6 +18,9 @@ using Counts = std::array<uint64_t, symbol_count>;
 
 /// With void voxels: what these become settles slowly.
 constexpr int most_masked_rounds = 12;
+
+/// Whether values or numbers of a palette are better is tried with so many.
+constexpr size_t pages_to_choose_by = 64;
 
 /// 256 log2(n), rounded down, of whole numbers alone: the same everywhere. 0 of 0.
 uint64_t log2_256(uint64_t n) {
@@ -64,22 +70,27 @@ uint32_t common_value(const ModelData& model, const std::vector<Sampled>& pages)
   return best;
 }
 
-void run(const ModelData& model, const Sampled& page, Residuals& out, uint32_t* decoded) {
-  if (model.wide())
-    find_residuals<Wide>(model, page.values, page.extent, page.parent, page.mask, out, decoded);
-  else
-    find_residuals<Narrow>(model, page.values, page.extent, page.parent, page.mask, out, decoded);
-}
-
 /// Codes the pages with the weights that the model has: what their symbols are, and what is decoded.
-std::vector<Counts> count_symbols(const ModelData& model, std::vector<Sampled>& pages) {
+Result<std::vector<Counts>> count_symbols(const ModelData& model, std::vector<Sampled>& pages,
+                                          const Context& ctx) {
   std::vector<Counts> counts(static_cast<size_t>(model.contexts()));
-  Residuals residuals;
-  for (Sampled& page : pages) {
-    run(model, page, residuals, page.decoded.data());
-    for (size_t i = 0; i < static_cast<size_t>(residuals.count); ++i)
-      ++counts[residuals.context[i]][symbol_of(residuals.folded[i])];
-  }
+  std::mutex mutex;
+  constexpr size_t pages_at_once = 32;
+  const size_t parts = (pages.size() + pages_at_once - 1) / pages_at_once;
+  VOX_CHECK(parallel_for(ctx, static_cast<int64_t>(parts), [&](int64_t i) -> Status {
+    const size_t first = static_cast<size_t>(i) * pages_at_once;
+    std::vector<Counts> own(counts.size());
+    Residuals residuals;
+    for (Sampled& page : std::span(pages).subspan(first, std::min(pages_at_once, pages.size() - first))) {
+      find_residuals(model, page.values, page.extent, page.parent, page.mask, residuals, page.decoded.data());
+      for (size_t r = 0; r < static_cast<size_t>(residuals.count); ++r)
+        ++own[residuals.context[r]][symbol_of(residuals.folded[r])];
+    }
+    const std::lock_guard lock(mutex);
+    for (size_t c = 0; c < counts.size(); ++c)
+      for (size_t s = 0; s < symbol_count; ++s) counts[c][s] += own[c][s];
+    return {};
+  }));
   return counts;
 }
 
@@ -100,7 +111,7 @@ uint64_t cost(const std::vector<Counts>& counts) {
 
 /// Weights and tables. What is predicted from is what the decoder has, which depends on the weights where
 /// there is a bound or void: they are fitted again to what those before led to, and the best are kept.
-void fit(ModelData& model, std::vector<Sampled>& pages, int most_rounds) {
+Status fit(ModelData& model, std::vector<Sampled>& pages, int most_rounds, const Context& ctx) {
   model.background = common_value(model, pages);
   std::erase_if(pages, [&](const Sampled& page) { return is_constant(model, page); });
   const double e = model.max_error;
@@ -121,10 +132,10 @@ void fit(ModelData& model, std::vector<Sampled>& pages, int most_rounds) {
   const bool masked = std::ranges::any_of(pages, [](const Sampled& page) { return page.mask != nullptr; });
   const int rounds = masked ? most_masked_rounds : model.max_error != 0 ? most_rounds : 1;
   for (int round = 0; round < rounds; ++round) {
-    equations.add(sources, noise);
+    VOX_CHECK(equations.add(sources, noise, ctx));
     noise = 0;
     model.set_weights(equations.weights());
-    std::vector<Counts> counts = count_symbols(model, pages);
+    VOX_TRY(std::vector<Counts> counts, count_symbols(model, pages, ctx));
     const uint64_t round_cost = cost(counts);
     const bool settled = masked && round != 0 && round_cost + least_cost / 256 > least_cost;
     if (round == 0 || round_cost < least_cost) {
@@ -137,6 +148,7 @@ void fit(ModelData& model, std::vector<Sampled>& pages, int most_rounds) {
   model.set_weights(best);
   for (size_t c = 0; c < best_counts.size(); ++c) model.tables[c] = normalise(best_counts[c]);
   model.derive();
+  return {};
 }
 
 }  // namespace
@@ -176,18 +188,31 @@ Parent<uint32_t> parent_of(const ModelBuilder::Page& page) {
   return parent;
 }
 
-/// Bytes of the model and of the pages it was made from.
-Result<size_t> size_with(const Model& model, std::span<const ModelBuilder::Page> pages) {
-  std::vector<std::byte> bytes = model.serialise();
-  for (const ModelBuilder::Page& page : pages)
-    VOX_CHECK(encode_page(model, std::span<const uint32_t>(page.samples), page.extent, bytes, parent_of(page),
-                          {}, page.mask ? &*page.mask : nullptr));
+/// Bytes of some pages.
+Result<size_t> size_of(const Model& model, std::span<const ModelBuilder::Page* const> pages) {
+  std::vector<std::byte> bytes;
+  for (const ModelBuilder::Page* page : pages)
+    VOX_CHECK(encode_page(model, std::span<const uint32_t>(page->samples), page->extent, bytes,
+                          parent_of(*page), {}, page->mask ? &*page->mask : nullptr));
   return bytes.size();
+}
+
+/// Every so many, of which there are at most `most`.
+std::vector<const ModelBuilder::Page*> some_of(std::span<const ModelBuilder::Page> pages, size_t most) {
+  std::vector<const ModelBuilder::Page*> some;
+  if (pages.empty()) return some;
+  const size_t step = pages.size() / most + (pages.size() % most != 0 ? 1 : 0);
+  for (size_t i = 0; i < pages.size(); i += step) some.push_back(&pages[i]);
+  return some;
+}
+
+bool counts_up_from_zero(const std::vector<uint32_t>& values) {
+  return values.empty() || values.back() == values.size() - 1;
 }
 
 }  // namespace
 
-Result<Model> ModelBuilder::build(const ModelOptions& options) const {
+Result<Model> ModelBuilder::build(const ModelOptions& options, const Context& ctx) const {
   const std::vector<uint32_t>& values = options.values;
   const uint32_t max_sample = pages_.empty() ? options.max_sample : std::min(options.max_sample, type_max_);
   if (options.max_error > most_error) return bad_usage("page model: expected an error bound below 2^31 - 1");
@@ -203,36 +228,43 @@ Result<Model> ModelBuilder::build(const ModelOptions& options) const {
     if (*std::ranges::max_element(page.samples) > max_sample)
       return bad_usage("page model: a sample above max_sample");
   }
-  const auto fitted = [&](const std::vector<uint32_t>& palette) -> Result<Model> {
+  const auto fitted = [&](bool palette, std::span<const Page* const> some) -> Result<Model> {
     auto made = std::make_shared<ModelData>();
     made->max_error = options.max_error;
-    made->max_value = palette.empty() ? max_sample : static_cast<uint32_t>(palette.size() - 1);
-    made->palette = palette;
+    made->max_value = palette ? static_cast<uint32_t>(values.size() - 1) : max_sample;
+    if (palette) made->set_palette(values);
     made->classes.parents = options.parents;
     std::vector<Sampled> pages;
-    for (const Page& page : pages_) {
+    for (const Page* page : some) {
       pages.push_back(
-          {page.extent, page.samples, {}, parent_of(page), {}, page.mask ? &*page.mask : nullptr});
-      if (!number(palette, pages.back().values))
+          {page->extent, page->samples, {}, parent_of(*page), {}, page->mask ? &*page->mask : nullptr});
+      if (!made->number(pages.back().values))
         return bad_usage("page model: a sample that is none of the values");
     }
-    fit(*made, pages, options.rounds);
+    VOX_CHECK(fit(*made, pages, options.rounds, ctx));
     return Model(std::move(made));
   };
-  VOX_TRY(Model best, fitted({}));
-  if (options.max_error != 0) return best;
-  const auto keep_smaller = [&](Model other) -> Status {
-    VOX_TRY(const size_t best_size, size_with(best, pages_));
-    VOX_TRY(const size_t other_size, size_with(other, pages_));
-    if (other_size < best_size) best = std::move(other);
-    return {};
+  const std::vector<const Page*> all = some_of(pages_, pages_.size());
+  // Bytes of models and of all pages, as some pages, which models are made for, tell.
+  const std::vector<const Page*> some = some_of(pages_, pages_to_choose_by);
+  const auto size_with = [&](const Model& model, std::span<const Page* const> pages) -> Result<size_t> {
+    VOX_TRY(const size_t bytes, size_of(model, pages));
+    return model.serialise().size() + bytes * all.size() / std::max<size_t>(pages.size(), 1);
   };
-  if (!values.empty()) {
-    VOX_TRY(Model numbered, fitted(values));
-    VOX_CHECK(keep_smaller(std::move(numbered)));
+  bool palette = false;
+  if (options.max_error == 0 && !counts_up_from_zero(values)) {
+    VOX_TRY(const Model as_they_are, fitted(false, some));
+    VOX_TRY(const Model numbered, fitted(true, some));
+    VOX_TRY(const size_t size, size_with(as_they_are, some));
+    VOX_TRY(const size_t numbered_size, size_with(numbered, some));
+    palette = numbered_size < size;
   }
-  if (options.labels && max_sample <= 0xffff) VOX_CHECK(keep_smaller(named(options.parents, max_sample)));
-  return best;
+  VOX_TRY(Model best, fitted(palette, all));
+  if (options.max_error != 0 || !options.labels || max_sample > 0xffff) return best;
+  Model labels = named(options.parents, max_sample);
+  VOX_TRY(const size_t size, size_with(best, all));
+  VOX_TRY(const size_t labels_size, size_with(labels, all));
+  return labels_size < size ? labels : best;
 }
 
 Model ModelBuilder::named(bool parents, uint32_t max_sample) const {

@@ -40,6 +40,8 @@ struct ModelData {
   uint32_t half_steps = 0;  ///< 2^15 / step: turns a range into half its steps
   std::array<std::array<uint16_t, symbol_count>, most_contexts> starts{};
   std::vector<DecodingTable> decoding;
+  /// Of a palette of up to 16 bits: the number of the entry next to each sample up to the greatest.
+  std::vector<uint16_t> numbers;
   /// With parents: weights of rows by class along y and z, of 16 voxels.
   std::array<RowWeights, most_classes / 4> rows{};
 
@@ -50,13 +52,13 @@ struct ModelData {
   bool wide() const { return max_value > 0xffff; }
   /// Bytes of a page of one value.
   size_t value_bytes() const { return max_value > 0xffff ? 4 : max_value > 0xff ? 2 : 1; }
+  void set_palette(std::vector<uint32_t> ascending);
+  /// The numbers that samples have in the palette, or themselves where there is none. False: one is missing.
+  bool number(std::span<uint32_t> samples) const;
+  /// What follows from weights and tables.
   void derive();
   void set_weights(const std::array<Weights, most_classes>& fitted);
 };
-
-/// The numbers that samples have in an ascending palette, or themselves where it is empty. False: one is
-/// missing.
-bool number(std::span<const uint32_t> palette, std::span<uint32_t> samples);
 
 template <class T>
 T sample_of(const ModelData& model, uint32_t value) {

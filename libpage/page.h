@@ -9,6 +9,7 @@
 #include <span>
 #include <vector>
 
+#include "formats/context.h"
 #include "formats/result.h"
 #include "libpage/extent.h"
 #include "libpage/mask.h"
@@ -81,8 +82,9 @@ class ModelBuilder {
            const Mask* mask = nullptr);
   void add(std::span<const uint32_t> samples, Extent extent, const Parent<uint32_t>& parent = {},
            const Mask* mask = nullptr);
-  /// Errors: ErrorCode::usage where options contradict each other or the samples.
-  Result<Model> build(const ModelOptions& options) const;
+  /// On the threads of `ctx`. Errors: ErrorCode::usage where options contradict each other or the samples;
+  /// ErrorCode::interrupted.
+  Result<Model> build(const ModelOptions& options, const Context& ctx = {}) const;
 
   struct Page {
     Extent extent;

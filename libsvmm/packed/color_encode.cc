@@ -81,6 +81,13 @@ class DecodedColors {
     VOX_TRY(mapped_, file_.map());
     return {};
   }
+  /// Planes of pages before this one are not needed any more.
+  void release(int64_t plane) const {
+    if (!mapped_) return;
+    uint64_t number = grid_.number({0, 0, plane});
+    while (number < places_.size() && places_[number] == none) ++number;
+    if (number < places_.size()) release_bytes(mapped_->bytes().first(places_[number] * sizeof(ColorPage)));
+  }
   ColorParent parent_of(Index3 child) const {
     ColorParent parent;
     parent.place(child, grid_);
@@ -222,6 +229,7 @@ class ColorEncoder {
         sampled.push_back(n);
         return {};
       }));
+      release(level, number);
       if (sampled.size() == most) break;
     }
     return sampled;
@@ -240,6 +248,7 @@ class ColorEncoder {
                      about_as_decoded(voxels, params_.channels, room);
                      return {};
                    }));
+    release(level + 1, parent_number);
     ColorParent parent;
     parent.place(child, above);
     parent.page = &room;
@@ -258,8 +267,14 @@ class ColorEncoder {
       }
       VOX_CHECK(read(level, number, number + 1, bytes,
                      [&](uint64_t, const ColorVoxels& voxels) -> Status { return take(voxels, parent); }));
+      release(level, number);
     }
     return {};
+  }
+  /// Of a page that was read alone: its rows lie far apart, and of mapped files each is a page of memory.
+  void release(int level, uint64_t number) {
+    const Box page = grid(level).box(number);
+    source(level).release(page.lo.z, page.hi.z);
   }
 
   /// Bytes of the models and of sample pages.
@@ -307,7 +322,7 @@ class ColorEncoder {
       // Differences from greens that are not as they were may be others.
       if (level == 0 && options.max_error == 0 && (bound_ == 0 || params_.channels.greatest(c) == 255))
         options.values = survey_.values(params_.channels, c);
-      VOX_TRY(page::Model channel, builder.build(options));
+      VOX_TRY(page::Model channel, builder.build(options, ctx_));
       model.models.push_back(std::move(channel));
     }
     return model;
@@ -356,6 +371,7 @@ class ColorEncoder {
         left = left.subspan(count * channels);
       }
       source(level).release(pages.box(first).lo.z, pages.box(last - 1).lo.z);
+      if (has_parents(level)) decoded_->release(pages.index(last - 1).z / 2);
       if (level == 0) ctx_.progress(static_cast<double>(last) / static_cast<double>(pages.pages()));
     }
     if (level > 0) VOX_CHECK(decoded->finish());

@@ -139,6 +139,7 @@ Result<std::unique_ptr<VolumeSource>> halved(VolumeSource& source,
     const Box slab{{0, 0, z}, {dims.x, dims.y, std::min(z + slices, dims.z)}};
     const VoxelSpan voxels = packed(in->data(), slab.size(), info.format);
     VOX_CHECK(read_slab(source, slab, voxels, ctx));
+    source.release(slab.lo.z, slab.hi.z);
     const ConstVoxelSpan read{voxels.data, voxels.row_stride, voxels.slice_stride};
     if (visit) visit(read, slab.size());
     VOX_CHECK(

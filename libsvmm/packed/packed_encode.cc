@@ -30,6 +30,8 @@ constexpr uint32_t bound_of_coarse_bytes = 2;
 /// Of a level, to learn what a bound leads to: fitting takes much longer than coding.
 constexpr uint64_t fewest_fitted = 16, most_fitted = 64, share_fitted = 8;
 constexpr int sampling_rounds = 2;
+/// Of a target: small volumes may need the third.
+constexpr int most_attempts = 3;
 
 /// Reads pages of a level as codes.
 class PageReader {
@@ -133,6 +135,10 @@ class DecodedLevel {
     VOX_TRY(mapped_, file_.map());
     return {};
   }
+  /// Planes of pages before this one are not needed any more.
+  void release(int64_t plane) const {
+    release_bytes(mapped_->bytes().first(grid_.number({0, 0, plane}) * stride_));
+  }
   /// The parents of a page of the next finer level.
   template <class T>
   page::Parent<T> parent_of(Index3 child) const {
@@ -193,7 +199,7 @@ class Encoder {
       std::unique_ptr<TemporaryFile> file = std::make_unique<TemporaryFile>("the compressed volume");
     };
     std::optional<Attempt> kept;
-    for (int i = 0; i < 2; ++i) {
+    for (int i = 0; i < most_attempts; ++i) {
       Attempt next;
       next.bound = search.best();
       if (kept && kept->bound == next.bound) break;
@@ -360,10 +366,13 @@ class Encoder {
   Status sample_pages(int level, uint64_t most, const Take& take) {
     const PageGrid pages = grid(level);
     PageReader reader(source(level), pages, params_, raster(level));
-    for (const uint64_t number : spread_pages(pages.pages(), most))
+    for (const uint64_t number : spread_pages(pages.pages(), most)) {
       VOX_CHECK(reader.read(number, number + 1, [&](uint64_t page, auto codes, page::Extent extent) {
         return take(reader, page, codes, extent);
       }));
+      // Rows of a page lie far apart: of mapped files each is a page of memory.
+      source(level).release(pages.box(number).lo.z, pages.box(number).hi.z);
+    }
     return {};
   }
   struct Sampled {
@@ -455,8 +464,8 @@ class Encoder {
         exact.parents = options.parents;
         exact.max_sample = options.max_sample;
         exact.values = values;
-        VOX_TRY(const page::Model bounded, builder.build(options));
-        VOX_TRY(const page::Model lossless, builder.build(exact));
+        VOX_TRY(const page::Model bounded, builder.build(options, ctx_));
+        VOX_TRY(const page::Model lossless, builder.build(exact, ctx_));
         VOX_TRY(const Sampled with_bound, encode_samples(level, bounded));
         VOX_TRY(const Sampled without, encode_samples(level, lossless));
         const bool smaller =
@@ -464,7 +473,7 @@ class Encoder {
         return smaller ? lossless : bounded;
       }
     }
-    return builder.build(options);
+    return builder.build(options, ctx_);
   }
 
   Status encode(int level, const page::Model& model, ContainerWriter& container) {
@@ -507,6 +516,7 @@ class Encoder {
         left = left.subspan(count);
       }
       source(level).release(pages.box(first).lo.z, pages.box(last - 1).lo.z);
+      if (model.has_parents()) decoded_->release(pages.index(last - 1).z / 2);
       if (level == 0) ctx_.progress(static_cast<double>(last) / static_cast<double>(pages.pages()));
     }
     if (level > 0) VOX_CHECK(decoded->finish());
