@@ -160,8 +160,8 @@ Result<Model> Model::parse(std::span<const std::byte> bytes) {
   if (m.max_error > most_error) return wrong("error bound: expected at most 2^31 - 2");
   if (m.background > m.max_value) return wrong("background: expected at most the greatest sample");
   if (has_palette) {
-    if (m.max_error != 0 || m.max_value > 0xffff)
-      return wrong("palette: expected at most 65536 entries, and no error");
+    if (m.max_error != 0 || m.max_value >= most_palette)
+      return wrong("palette: expected at most 262144 entries, and no error");
     uint64_t next = 0;
     std::vector<uint32_t> palette;
     for (uint32_t i = 0; i <= m.max_value; ++i) {

@@ -218,7 +218,7 @@ Result<Model> ModelBuilder::build(const ModelOptions& options, const Context& ct
   if (options.max_error > most_error) return bad_usage("page model: expected an error bound below 2^31 - 1");
   if (values.size() > most_palette ||
       std::ranges::adjacent_find(values, std::ranges::greater_equal()) != values.end())
-    return bad_usage("page model: expected at most 65536 values, ascending");
+    return bad_usage("page model: expected at most 262144 values, ascending");
   if (!values.empty() && values.back() > max_sample) return bad_usage("page model: a value above max_sample");
   for (const Page& page : pages_) {
     if (!page.extent.valid() || page.samples.size() != static_cast<size_t>(page.extent.voxels()))

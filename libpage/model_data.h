@@ -20,7 +20,7 @@ namespace voxkit::page {
 inline constexpr uint32_t most_error = 0x7ffffffe;
 
 /// Entries of a palette.
-inline constexpr size_t most_palette = 65536;
+inline constexpr size_t most_palette = size_t{1} << 18;
 
 /// The weight of each tap for each voxel of a row.
 using RowWeights = std::array<std::array<int16_t, max_side>, tap_count>;

@@ -59,7 +59,7 @@ struct ModelOptions {
   uint32_t max_error = 0;
   /// The greatest sample that any page will have, if the type of the samples could hold more.
   uint32_t max_sample = 0xffffffff;
-  /// All values that samples of any page have, ascending, at most 65536 of them; or empty. The model has a
+  /// All values that samples of any page have, ascending, at most 262144 of them; or empty. The model has a
   /// palette of them where that is smaller, and the bound is 0.
   std::vector<uint32_t> values;
   /// Whether pages have parents.

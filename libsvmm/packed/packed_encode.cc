@@ -27,6 +27,10 @@ namespace {
 /// How far voxels of coarser levels of 8 bits may be from means: this saves up to half of what levels of
 /// clean volumes cost.
 constexpr uint32_t bound_of_coarse_bytes = 2;
+/// Of floats without a bound, in codes: a 512th to a 1024th of each.
+constexpr uint32_t bound_of_coarse_floats = 1 << 14;
+/// Floats of fewer values, such as masks, have exact means.
+constexpr size_t least_values_of_coarse_floats = 1024;
 /// Of a level, to learn what a bound leads to: fitting takes much longer than coding.
 constexpr uint64_t fewest_fitted = 16, most_fitted = 64, share_fitted = 8;
 constexpr int sampling_rounds = 2;
@@ -280,7 +284,7 @@ class Encoder {
   const Raster& raster(int level) const { return level == 0 ? all_values_ : raster_; }
   /// Of the codes of a level, and of integers of their samples.
   uint32_t bound(int level) const {
-    if (info_.format == VoxelFormat::float32) return 0;
+    if (info_.format == VoxelFormat::float32) return level > 0 && coarse_floats_ ? bound_of_coarse_floats : 0;
     const auto bound = static_cast<uint32_t>(params_.max_error);
     if (level == 0) return bound;
     if (!raster_.empty()) return 0;
@@ -308,7 +312,13 @@ class Encoder {
     params_.max_error = max_error;
     if (info_.format == VoxelFormat::float32) {
       params_.map = ValueMap::for_floats(survey_.range(), max_error);
-      if (params_.map.kind == CodeKind::ordered) params_.max_error = 0;
+      coarse_floats_ = false;
+      if (params_.map.kind == CodeKind::ordered) {
+        params_.max_error = 0;
+        const auto values = survey_.values();
+        coarse_floats_ =
+            survey_.finite() && (values.empty() || values.size() > least_values_of_coarse_floats);
+      }
       return params_.map.kind == CodeKind::steps ? place_steps() : Status();
     }
     params_.max_error = std::floor(max_error);
@@ -414,8 +424,8 @@ class Encoder {
     VOX_CHECK(PageReader(source(level + 1), above, params_, raster(level + 1))
                   .read(parent_number, parent_number + 1, [&](uint64_t, auto codes, page::Extent) -> Status {
                     for (const auto code : codes)
-                      room.push_back(static_cast<T>(std::min<uint64_t>((code + bound_above) / step * step,
-                                                                       std::numeric_limits<T>::max())));
+                      room.push_back(static_cast<T>(std::min<uint64_t>(
+                          (uint64_t{code} + bound_above) / step * step, std::numeric_limits<T>::max())));
                     return {};
                   }));
     page::Parent<T> parent = placed<T>(child, above);
@@ -446,6 +456,7 @@ class Encoder {
                      }));
     if (info_.format == VoxelFormat::float32) {
       const bool steps = params_.map.kind == CodeKind::steps;
+      options.max_error = bound(level);
       options.max_sample = steps ? params_.map.code(static_cast<float>(survey_.range().hi)) : 0xffffffff;
       if (!steps && level == 0) options.values = survey_.values();
     } else {
@@ -530,8 +541,9 @@ class Encoder {
   PackedParams params_;
   Survey survey_;
   const Raster all_values_;
-  Raster raster_;              ///< of coarser levels
-  bool coarse_bytes_ = false;  ///< whether these are of 8 bits, and need not be exact
+  Raster raster_;               ///< of coarser levels
+  bool coarse_bytes_ = false;   ///< whether these are of 8 bits, and need not be exact
+  bool coarse_floats_ = false;  ///< whether they are floats, and need not be exact
   std::vector<std::unique_ptr<VolumeSource>> coarser_;
   std::unique_ptr<DecodedLevel> decoded_;  ///< the level above that which comes next
   double squared_error_ = 0;               ///< of level 0

@@ -19,7 +19,8 @@ void mark(ConstVoxelSpan voxels, Index3 size, std::atomic<uint8_t>* seen) {
     }
 }
 
-constexpr size_t most_floats = 65536;
+/// As many as a palette of a model may have.
+constexpr size_t most_floats = size_t{1} << 18;
 
 /// Codes of the floats, up to more than `most_floats`.
 std::unordered_set<uint32_t> codes_of(ConstVoxelSpan voxels, Index3 size) {
@@ -40,14 +41,17 @@ std::unordered_set<uint32_t> codes_of(ConstVoxelSpan voxels, Index3 size) {
   return codes;
 }
 
-ValueRange range_of(ConstVoxelSpan voxels, Index3 size) {
+ValueRange range_of(ConstVoxelSpan voxels, Index3 size, std::atomic<bool>& infinite) {
   float lo = INFINITY, hi = -INFINITY;
   for (int64_t z = 0; z < size.z; ++z)
     for (int64_t y = 0; y < size.y; ++y) {
       const auto* const row = reinterpret_cast<const float*>(voxels.row(y, z));
       for (int64_t x = 0; x < size.x; ++x) {
         const float v = row[x];
-        if (!std::isfinite(v)) continue;
+        if (!std::isfinite(v)) {
+          infinite = true;
+          continue;
+        }
         lo = std::min(lo, v), hi = std::max(hi, v);
       }
     }
@@ -80,7 +84,7 @@ void Survey::look(ConstVoxelSpan voxels, Index3 size) {
       floats_.clear();
     }
   }
-  const ValueRange found = range_of(voxels, size);
+  const ValueRange found = range_of(voxels, size, infinite_);
   if (found.lo > found.hi) return;
   const std::lock_guard lock(mutex_);
   range_ = range_.lo <= range_.hi ? ValueRange{std::min(range_.lo, found.lo), std::max(range_.hi, found.hi)}

@@ -138,6 +138,25 @@ TEST(Page, OfFewValuesHasAPalette) {
   EXPECT_FALSE(encode_page(numbered, std::span<const uint16_t>(other), Extent{1, 1, 1}, out));
 }
 
+TEST(Page, APaletteMayHaveNumbersOfMoreThan16Bits) {
+  ModelOptions options;
+  for (uint32_t i = 0; i < 70000; ++i) options.values.push_back(i * 61000u + i % 7);
+  std::vector<std::vector<uint32_t>> pages(32);
+  const std::vector<Extent> sizes(pages.size(), Extent{});
+  uint32_t number = 0;
+  for (auto& page : pages)
+    for (int i = 0; i < max_voxels; ++i) page.push_back(options.values[number = (number + i % 5) % 70000]);
+  ModelOptions plain = options;
+  plain.values.clear();
+  const Model numbered = fit<uint32_t>(pages, sizes, options);
+  EXPECT_LT(numbered.serialise().size(), size_t{1} << 19);
+  EXPECT_GT(numbered.serialise().size(), 2 * fit<uint32_t>(pages, sizes, plain).serialise().size());
+  round_trip<uint32_t>(numbered, pages, sizes);
+  options.values.resize((size_t{1} << 18) + 1);
+  for (uint32_t i = 0; i < options.values.size(); ++i) options.values[i] = i;
+  EXPECT_EQ(ModelBuilder().build(options).error().code, ErrorCode::usage);
+}
+
 TEST(Page, ConstantWithinTheBoundCostsNextToNothing) {
   ModelBuilder builder;
   const std::vector<uint16_t> empty(4096, 100), full(4096, 3000);

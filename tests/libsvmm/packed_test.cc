@@ -123,6 +123,33 @@ TEST(Packed, LevelsAreNoFinerThanTheVolume) {
   }
 }
 
+TEST(Packed, LevelsOfManyFloatsAreWithinA512thOfMeans) {
+  const VolumeInfo info = make_info({40, 33, 36}, VoxelFormat::float32);
+  Bytes voxels(raw_bytes(info));
+  const auto put = [&](size_t i, float value) { std::memcpy(&voxels[4 * i], &value, 4); };
+  const auto coarser_of = [&](const Bytes& bytes) {
+    voxkit::test::MemorySource source(info, bytes);
+    const auto volume = open(encode(source, {}).bytes);
+    EXPECT_EQ(decode(*volume), bytes);
+    return numbers(decode(*volume, 1), info.format);
+  };
+  // Values in the order of a hash, each four times, and of both signs: what a palette of 11880 is good for.
+  for (size_t i = 0; i < voxels.size() / 4; ++i)
+    put(i, static_cast<float>(std::sin(static_cast<double>(i / 4 * 2654435761u % 11880)) * 1e-3));
+  const auto means = means_of(numbers(voxels, info.format), info.dims, info.format);
+  auto near = coarser_of(voxels);
+  double worst = 0;
+  for (size_t i = 0; i < means.size(); ++i)
+    worst = std::max(worst, std::abs(near[i] - means[i]) / std::abs(means[i]));
+  EXPECT_LE(worst, 1.0 / 512);
+  EXPECT_GT(worst, 1e-6);
+  // Where there are infinities or NaN, means are exact.
+  put(5, std::numeric_limits<float>::infinity());
+  near = coarser_of(voxels);
+  const auto exact = means_of(numbers(voxels, info.format), info.dims, info.format);
+  EXPECT_EQ(near, exact);
+}
+
 TEST(Packed, LevelsOfLabelsAndTablesAreTheCommonest) {
   for (const bool table : {false, true}) {
     VolumeInfo info = make_info({3, 2, 2}, VoxelFormat::density8);

@@ -11,12 +11,12 @@ namespace {
 
 TEST(Survey, MoreFloatsThanAreCountedAreNoneFromAnyThreads) {
   constexpr int threads = 4;
-  constexpr int64_t side = 200;  // 40000 values a thread
+  constexpr int64_t side = 400;  // 160000 values a thread
   std::vector<std::vector<float>> parts(threads);
   for (size_t i = 0; i < threads; ++i)
     for (int64_t v = 0; v < side * side; ++v)
       parts[i].push_back(static_cast<float>(v + static_cast<int64_t>(i) * side * side));
-  for (int round = 0; round < 40; ++round) {
+  for (int round = 0; round < 20; ++round) {
     Survey survey(VoxelFormat::float32);
     std::atomic<int> ready{0};
     std::vector<std::thread> running;

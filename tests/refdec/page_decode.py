@@ -102,7 +102,7 @@ class Model:
         require(self.background <= self.most, "page model: background {} above {}", self.background, self.most)
         self.palette = None
         if self.has_palette:
-            require(self.most < 1 << 16 and self.bound == 0, "page model: a palette of {}, bound {}", self.most + 1,
+            require(self.most < 1 << 18 and self.bound == 0, "page model: a palette of {}, bound {}", self.most + 1,
                     self.bound)
             self.palette, entry = [], -1
             for _ in range(self.most + 1):

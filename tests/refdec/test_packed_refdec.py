@@ -39,7 +39,7 @@ class Models(unittest.TestCase):
         self.refused("bound", bound=2**31 - 1)
         self.refused("palette", palette=range(10))  # and a bound
         self.refused("entry", palette=[2**32 - 9 + i for i in range(10)], bound=0)
-        self.refused("palette", palette=[0], most=65536, bound=0)
+        self.refused("palette", palette=[0], most=1 << 18, bound=0)
         self.refused("first table", first_same=1)
         self.refused("table of 73", parts=[1] * 73)
         self.refused("adds up", parts=(1000, 500, 548))
