@@ -141,7 +141,7 @@ TEST(Page, OfFewValuesHasAPalette) {
 TEST(Page, APaletteMayHaveNumbersOfMoreThan16Bits) {
   ModelOptions options;
   for (uint32_t i = 0; i < 70000; ++i) options.values.push_back(i * 61000u + i % 7);
-  std::vector<std::vector<uint32_t>> pages(32);
+  std::vector<std::vector<uint32_t>> pages(96);
   const std::vector<Extent> sizes(pages.size(), Extent{});
   uint32_t number = 0;
   for (auto& page : pages)
