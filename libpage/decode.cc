@@ -91,14 +91,9 @@ template <class T>
 bool decode_constant(const ModelData& model, const PageJob<T>& job, bool& whole) {
   whole = true;
   if (job.page.size() > model.value_bytes()) return false;
-  uint32_t value = model.background;
-  if (!job.page.empty()) {
-    value = 0;
-    for (size_t i = 0; i < job.page.size(); ++i) value |= std::to_integer<uint32_t>(job.page[i]) << 8 * i;
-    whole = job.page.size() == model.value_bytes() && value <= model.max_value;
-    if (!whole) return true;
-  }
-  std::ranges::fill(job.out, sample_of<T>(model, value));
+  const auto value = model.value_of(job.page);
+  whole = value.has_value();
+  if (whole) std::ranges::fill(job.out, sample_of<T>(model, *value));
   return true;
 }
 
@@ -178,6 +173,14 @@ Status decode_one(const Model& model, std::span<const std::byte> page, Extent ex
 }
 
 }  // namespace
+
+Result<std::optional<uint32_t>> uniform_sample(const Model& model, std::span<const std::byte> page) {
+  const ModelData& data = model.data();
+  if (page.size() > data.value_bytes()) return std::nullopt;
+  const auto value = data.value_of(page);
+  if (!value) return tl::unexpected<Error>(damaged().error());
+  return sample_of<uint32_t>(data, *value);
+}
 
 Status decode_page(const Model& model, std::span<const std::byte> page, Extent extent, std::span<uint8_t> out,
                    const Parent<uint8_t>& parent, const Mask* mask) {

@@ -88,6 +88,14 @@ uint32_t ModelData::nearest(uint32_t sample) const {
   return search_nearest(palette, sample);
 }
 
+std::optional<uint32_t> ModelData::value_of(std::span<const std::byte> page) const {
+  if (page.empty()) return background;
+  uint32_t value = 0;
+  for (size_t i = 0; i < page.size(); ++i) value |= std::to_integer<uint32_t>(page[i]) << 8 * i;
+  if (page.size() != value_bytes() || value > max_value) return std::nullopt;
+  return value;
+}
+
 bool ModelData::number(std::span<uint32_t> samples) const {
   if (palette.empty()) return true;
   for (uint32_t& sample : samples) {
@@ -199,6 +207,9 @@ bool Model::has_labels() const {
 }
 uint32_t Model::max_sample() const {
   return data_->palette.empty() ? data_->max_value : data_->palette.back();
+}
+size_t Model::value_bytes() const {
+  return data_->value_bytes();
 }
 uint32_t Model::background() const {
   return data_->palette.empty() ? data_->background : data_->palette[data_->background];

@@ -52,6 +52,8 @@ struct ModelData {
   bool wide() const { return max_value > 0xffff; }
   /// Bytes of a page of one value.
   size_t value_bytes() const { return max_value > 0xffff ? 4 : max_value > 0xff ? 2 : 1; }
+  /// The value of a page of at most so many; nothing where it has none so.
+  std::optional<uint32_t> value_of(std::span<const std::byte> page) const;
   void set_palette(std::vector<uint32_t> ascending);
   /// The numbers that samples have in the palette, or themselves where there is none. False: one is missing.
   bool number(std::span<uint32_t> samples) const;

@@ -37,6 +37,8 @@ class Model {
   uint32_t max_sample() const;
   /// What a page of no bytes is full of.
   uint32_t background() const;
+  /// A page of at most so many bytes is full of one sample.
+  size_t value_bytes() const;
   /// For the library itself.
   const ModelData& data() const { return *data_; }
   explicit Model(std::shared_ptr<const ModelData> data) : data_(std::move(data)) {}
@@ -118,6 +120,10 @@ Status encode_page(const Model& model, std::span<const uint16_t> samples, Extent
 Status encode_page(const Model& model, std::span<const uint32_t> samples, Extent extent,
                    std::vector<std::byte>& out, const Parent<uint32_t>& parent = {},
                    std::span<uint32_t> decoded = {}, const Mask* mask = nullptr);
+
+/// The one sample that a page is full of, which its length shows; nothing where it has to be decoded. Errors:
+/// ErrorCode::input where there is no such sample.
+Result<std::optional<uint32_t>> uniform_sample(const Model& model, std::span<const std::byte> page);
 
 /// Decodes a page of exactly these bytes into `extent.voxels()` samples. Safe on any bytes: it touches
 /// nothing else, and damage that shows is ErrorCode::input; what was written by then is undefined.

@@ -305,6 +305,7 @@ Status report(const RenderOptions& o, const Plan& plan, const Drawn& drawn, Outc
     const Index3 bricks = drawn.scene.volume->ranges().bricks();
     json.set("bricks", bricks.x * bricks.y * bricks.z)
         .set("bricks_visible", drawn.scene.dvr->visible_bricks());
+    if (drawn.scene.dvr->volume().packed()) json.set("pages_decoded", drawn.scene.dvr->pages_decoded());
   }
   outcome.costs.write(json);
   if (drawn.other) {

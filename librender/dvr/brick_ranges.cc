@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <glm/common.hpp>
 #include <limits>
 #include <mutex>
 #include <vector>
@@ -152,6 +153,12 @@ Result<BrickRanges> BrickRanges::of(const svmm::Volume& volume, Context& ctx) {
 Result<BrickRanges> BrickRanges::of(const svmm::PackedVolume& volume, Context& ctx) {
   const VolumeInfo info = volume.info_of(volume.finest());
   VOX_TRY(BrickRanges ranges, create(info, ctx));
+  VOX_TRY(const auto pages, svmm::page_ranges(volume));
+  if (pages) {
+    ranges.all_ = pages->all.lo <= pages->all.hi ? pages->all : ValueRange{0, 0};
+    ranges.spread_pages(pages->pages, volume.params().page_side, info.dims);
+    return ranges;
+  }
   const auto decode = [&](const Box& box, VoxelSpan out) -> Status {
     svmm::PackedVolume::Reader reader(volume,
                                       volume.finest());  // what the slabs beside it need, too, is kept
@@ -160,6 +167,68 @@ Result<BrickRanges> BrickRanges::of(const svmm::PackedVolume& volume, Context& c
   // Layers of whole pages.
   VOX_CHECK(
       ranges.measure(info, volume.params().page_side / dvr_brick, decoded_slabs(info, decode, ctx), ctx));
+  return ranges;
+}
+
+void BrickRanges::spread_pages(std::span<const svmm::PageRanges::Range> pages, int64_t side, Index3 dims) {
+  const Index3 count = (dims + (side - 1)) / side;
+  Range* out = ranges_;
+  for (int64_t z = 0; z < bricks_.z; ++z)
+    for (int64_t y = 0; y < bricks_.y; ++y)
+      for (int64_t x = 0; x < bricks_.x; ++x) {
+        const Index3 lo = Index3(x, y, z) * int64_t{dvr_brick}, first = lo / side,
+                     last = glm::min(lo + int64_t{dvr_brick}, dims - int64_t{1}) / side;
+        Range range = nothing;
+        for (int64_t k = first.z; k <= last.z; ++k)
+          for (int64_t j = first.y; j <= last.y; ++j)
+            for (int64_t i = first.x; i <= last.x; ++i) {
+              const auto& page = pages[static_cast<size_t>((k * count.y + j) * count.x + i)];
+              if (page.lo <= page.hi) range = merged(range, {page.lo, page.hi});
+            }
+        *out++ = range;
+      }
+}
+
+Result<BrickRanges> BrickRanges::finer(const svmm::PackedVolume& volume, const TransferFunction& transfer,
+                                       Context& ctx) const {
+  if (!all_) return *this;
+  const VolumeInfo info = volume.info_of(volume.finest());
+  VOX_TRY(BrickRanges ranges, create(info, ctx));
+  std::copy_n(ranges_, bricks_.x * bricks_.y * bricks_.z, ranges.ranges_);
+  ranges.all_ = all_;
+  const int64_t side = volume.params().page_side, bricks = side / dvr_brick;
+  const Index3 pages = (info.dims + (side - 1)) / side;
+  VOX_CHECK(parallel_for(ctx, pages.y * pages.z, [&](int64_t row) -> Status {
+    svmm::PackedVolume::Reader reader(volume, volume.finest());
+    std::vector<std::byte> voxels(static_cast<size_t>((side + 1) * (side + 1) * (side + 1)) * sizeof(float));
+    for (int64_t x = 0; x < pages.x; ++x) {
+      const Index3 lo = Index3(x, row % pages.y, row / pages.y) * side;
+      const Box page{lo, glm::min(lo + (side + 1), info.dims)};
+      const Box inside{lo / int64_t{dvr_brick}, glm::min(lo / int64_t{dvr_brick} + bricks, bricks_)};
+      const auto each = [&](const auto& brick) {
+        for (int64_t k = inside.lo.z; k < inside.hi.z; ++k)
+          for (int64_t j = inside.lo.y; j < inside.hi.y; ++j)
+            for (int64_t i = inside.lo.x; i < inside.hi.x; ++i)
+              brick(Index3(i, j, k), ranges.ranges_[(k * bricks_.y + j) * bricks_.x + i]);
+      };
+      bool seen = false;
+      each([&](Index3, const Range& range) {
+        seen = seen || (range.lo < range.hi && transfer.shows(range.lo, range.hi));
+      });
+      if (!seen) continue;
+      const VoxelSpan out = packed(voxels.data(), page.size(), info.format);
+      VOX_CHECK(reader.read(page, out));
+      each([&](Index3 brick, Range& range) {
+        const Index3 first = brick * int64_t{dvr_brick} - lo,
+                     last = glm::min(first + int64_t{dvr_brick + 1}, page.size());
+        const ConstVoxelSpan at{out.row(first.y, first.z) + first.x * voxel_bytes(info.format),
+                                out.row_stride, out.slice_stride};
+        const auto found = svmm::range_of(at, last - first, info.format);
+        range = found.lo <= found.hi ? Range{found.lo, found.hi} : nothing;
+      });
+    }
+    return {};
+  }));
   return ranges;
 }
 
@@ -218,6 +287,7 @@ Status BrickRanges::spread(Context& ctx) {
 }
 
 ValueRange BrickRanges::all() const {
+  if (all_) return *all_;
   Range range = nothing;
   for (int64_t i = 0; i < bricks_.x * bricks_.y * bricks_.z; ++i) range = merged(range, ranges_[i]);
   if (!(range.lo <= range.hi)) return {0, 0};

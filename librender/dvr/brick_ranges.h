@@ -2,11 +2,13 @@
 #pragma once
 
 #include <memory>
+#include <optional>
 #include <span>
 
 #include "librender/cast/grid.h"
 #include "librender/dvr/transfer.h"
 #include "libsvmm/packed/packed.h"
+#include "libsvmm/packed/page_ranges.h"
 #include "libsvmm/svmm.h"
 #include "libvq/vq.h"
 
@@ -26,8 +28,13 @@ class BrickRanges {
   /// One pass over all voxels.
   static Result<BrickRanges> of(const DenseGrid& grid, Context& ctx);
   static Result<BrickRanges> of(const svmm::Volume& volume, Context& ctx);
-  /// Of scalars, of the finest level that is there.
+  /// Of scalars, of the finest level that is there. Decodes all of it, unless the file says which values its
+  /// pages have: then ranges are of whole pages.
   static Result<BrickRanges> of(const svmm::PackedVolume& volume, Context& ctx);
+  /// Of the same volume, exact where a brick may be shown: decodes the pages of such bricks. As they are, if
+  /// they are not of whole pages.
+  Result<BrickRanges> finer(const svmm::PackedVolume& volume, const TransferFunction& transfer,
+                            Context& ctx) const;
   /// From the records of the bricks, without decoding any. So a range is that of the brick and all of its
   /// neighbours that samples may reach.
   static Result<BrickRanges> of(const vq::Volume& volume, Context& ctx);
@@ -43,12 +50,15 @@ class BrickRanges {
   static Result<BrickRanges> create(const VolumeInfo& info, Context& ctx);
   template <class Read>
   Status measure(const VolumeInfo& info, int64_t layers, const Read& read, Context& ctx);
+  /// From pages to the bricks in them, with the voxels one further on.
+  void spread_pages(std::span<const svmm::PageRanges::Range> pages, int64_t side, Index3 dims);
   /// From bricks alone to bricks and those next to them.
   Status spread(Context& ctx);
 
   Index3 bricks_{0};
   std::shared_ptr<Buffer> memory_;
   Range* ranges_ = nullptr;
+  std::optional<ValueRange> all_;  ///< where ranges are of whole pages
 };
 
 /// For each brick, how far it is to the next one that can be seen: 0 where it can be seen itself, else all

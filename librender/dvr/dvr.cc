@@ -105,8 +105,15 @@ Result<DvrVolume> DvrVolume::open(std::shared_ptr<const svmm::PackedVolume> comp
 
 Result<DvrScene> DvrScene::create(std::shared_ptr<const DvrVolume> volume, TransferFunction transfer,
                                   Context& ctx) {
-  VOX_TRY(BrickSkips skips, BrickSkips::create(volume->ranges(), transfer, ctx));
-  return DvrScene(std::move(volume), std::move(transfer), std::move(skips));
+  if (!volume->packed()) {
+    VOX_TRY(BrickSkips skips, BrickSkips::create(volume->ranges(), transfer, ctx));
+    return DvrScene(std::move(volume), std::move(transfer), std::move(skips), 0);
+  }
+  const uint64_t pages = volume->packed()->pages_decoded();
+  VOX_TRY(const BrickRanges finer, volume->ranges().finer(*volume->packed(), transfer, ctx));
+  VOX_TRY(BrickSkips skips, BrickSkips::create(finer, transfer, ctx));
+  const uint64_t decoded = volume->packed()->pages_decoded() - pages;
+  return DvrScene(std::move(volume), std::move(transfer), std::move(skips), decoded);
 }
 
 bool is_direct(const VolumeInfo& info) {

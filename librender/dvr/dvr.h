@@ -17,7 +17,8 @@ class DvrVolume {
   static Result<DvrVolume> open(std::shared_ptr<const DenseGrid> grid, Context& ctx);
   static Result<DvrVolume> open(std::shared_ptr<const svmm::Volume> volume, Context& ctx);
   static Result<DvrVolume> open(std::shared_ptr<const vq::Volume> volume, Context& ctx);
-  /// The finest level that is there. Decodes every coded page once, and again where a picture needs them.
+  /// The finest level that is there. Where the file does not say which values its pages have, decodes all of
+  /// them.
   static Result<DvrVolume> open(std::shared_ptr<const svmm::PackedVolume> volume, Context& ctx);
 
   const VolumeInfo& info() const { return info_; }
@@ -61,6 +62,7 @@ struct DvrOptions {
 /// A volume seen through a transfer function, for any number of pictures.
 class DvrScene {
  public:
+  /// Of a packed volume, decodes the pages that the transfer function may show.
   static Result<DvrScene> create(std::shared_ptr<const DvrVolume> volume, TransferFunction transfer,
                                  Context& ctx);
   /// Samples on planes that are equally far apart, trilinear between voxel centres and clamped at the
@@ -76,13 +78,20 @@ class DvrScene {
   const BrickSkips& skips() const { return skips_; }
   /// Bricks that samples may show.
   int64_t visible_bricks() const { return skips_.visible(); }
+  /// Of a packed volume, those decoded for this, before any picture.
+  uint64_t pages_decoded() const { return pages_decoded_; }
 
  private:
-  DvrScene(std::shared_ptr<const DvrVolume> volume, TransferFunction transfer, BrickSkips skips)
-      : volume_(std::move(volume)), transfer_(std::move(transfer)), skips_(std::move(skips)) {}
+  DvrScene(std::shared_ptr<const DvrVolume> volume, TransferFunction transfer, BrickSkips skips,
+           uint64_t pages)
+      : volume_(std::move(volume)),
+        transfer_(std::move(transfer)),
+        skips_(std::move(skips)),
+        pages_decoded_(pages) {}
   std::shared_ptr<const DvrVolume> volume_;
   TransferFunction transfer_;
   BrickSkips skips_;
+  uint64_t pages_decoded_;
 };
 
 }  // namespace voxkit::render

@@ -17,6 +17,7 @@
 #include "libsvmm/packed/color_encode.h"
 #include "libsvmm/packed/halve.h"
 #include "libsvmm/packed/packed_layout.h"
+#include "libsvmm/packed/page_ranges.h"
 #include "libsvmm/packed/raster.h"
 #include "libsvmm/packed/survey.h"
 #include "libsvmm/packed/target.h"
@@ -34,6 +35,8 @@ constexpr size_t least_values_of_coarse_floats = 1024;
 /// Of a level, to learn what a bound leads to: fitting takes much longer than coding.
 constexpr uint64_t fewest_fitted = 16, most_fitted = 64, share_fitted = 8;
 constexpr int sampling_rounds = 2;
+/// So few are decoded at once where it matters which values they have.
+constexpr uint64_t most_pages_without_ranges = 8;
 /// Of a target: small volumes may need the third.
 constexpr int most_attempts = 3;
 
@@ -233,6 +236,7 @@ class Encoder {
   Result<Written> write(double max_error, const ByteSink& sink) {
     decoded_.reset();
     squared_error_ = 0;
+    ranges_.clear();
     VOX_CHECK(set_bound(max_error));
     if (params_.map.kind == CodeKind::steps) VOX_CHECK(choose_map());
     ContainerWriter container(sink, Codec::svmm, container_version_for(info_), 0, *ctx_.memory);
@@ -248,6 +252,8 @@ class Encoder {
         VOX_CHECK(container.add(model_kind, static_cast<uint32_t>(fitted), 0, model->serialise()));
       }
       VOX_CHECK(encode(level, *model, container));
+      if (level == 0 && !has_no_means(info_) && grid(0).pages() > most_pages_without_ranges)
+        VOX_CHECK(container.add(ranges_kind, 0, 0, pack_ranges(ranges_)));
       // What is there by now is a file of the coarser levels.
       VOX_CHECK(level == 0 ? container.finish() : container.checkpoint());
     }
@@ -498,6 +504,7 @@ class Encoder {
                      last = std::min(end_part * pages.pages_a_part(), pages.pages());
       std::vector<std::vector<std::byte>> encoded(last - first);
       std::vector<double> errors(last - first);  // squared, of level 0
+      std::vector<CodeRange> ranges(level == 0 ? last - first : 0);
       const auto runs = runs_of(pages, first, last);
       if (level > 0) batch.resize((last - first) * decoded->page_bytes());
       VOX_CHECK(parallel_for(ctx_, static_cast<int64_t>(runs.size()), [&](int64_t i) -> Status {
@@ -514,11 +521,16 @@ class Encoder {
           const std::span<T> again(kept, codes.size());
           const Status status =
               page::encode_page(model, codes, extent, encoded[number - first], parent, again);
-          if (level == 0) errors[number - first] = squared_error<T>(reader, codes, again);
+          if (level == 0) {
+            errors[number - first] = squared_error<T>(reader, codes, again);
+            ranges[number - first] = finite_range(std::span<const T>(again), params_.map);
+          }
           return status;
         });
       }));
       for (const double error : errors) squared_error_ += error;
+      for (size_t i = 0; i < ranges.size(); ++i)
+        if (encoded[i].size() > model.value_bytes()) ranges_.push_back(ranges[i]);
       if (level > 0) VOX_CHECK(decoded->write(batch));
       std::span<const std::vector<std::byte>> left = encoded;
       for (uint64_t p = part; p < end_part; ++p) {
@@ -547,6 +559,7 @@ class Encoder {
   std::vector<std::unique_ptr<VolumeSource>> coarser_;
   std::unique_ptr<DecodedLevel> decoded_;  ///< the level above that which comes next
   double squared_error_ = 0;               ///< of level 0
+  std::vector<CodeRange> ranges_;          ///< of the coded pages of level 0
 };
 
 }  // namespace

@@ -17,6 +17,8 @@ namespace voxkit::svmm {
 inline constexpr uint32_t packed_kind = chunk_kind("PAKP");
 /// Index: level; it is the model of coarser levels, too, up to the next that has one.
 inline constexpr uint32_t model_kind = chunk_kind("MODL");
+/// Of scalars: which values the pages of level 0 have (page_ranges.h).
+inline constexpr uint32_t ranges_kind = chunk_kind("RNGE");
 inline constexpr uint32_t pages_kind = chunk_kind("PAGE");  ///< index: level; part: run of pages
 /// Of colours: the masks of pages and their model, as those two. MODL has a part for each channel.
 inline constexpr uint32_t mask_kind = chunk_kind("MASK");

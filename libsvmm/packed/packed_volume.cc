@@ -3,10 +3,12 @@
 #include <array>
 #include <atomic>
 #include <cmath>
+#include <mutex>
 
 #include "formats/parallel.h"
 #include "formats/volume_chunks.h"
 #include "libsvmm/packed/packed_pages.h"
+#include "libsvmm/packed/page_ranges.h"
 
 namespace voxkit::svmm {
 
@@ -85,6 +87,11 @@ Result<std::shared_ptr<const PackedVolume>> PackedVolume::open(std::shared_ptr<c
     const ChunkEntry& entry = table[i];
     const bool model = entry.kind == model_kind || (colors && entry.kind == mask_model_kind);
     const bool part = entry.kind == pages_kind || (colors && entry.kind == mask_kind);
+    const auto end = [&] { return i + 1 < table.size() ? table[i + 1].offset : container->file_bytes(); };
+    if (entry.kind == ranges_kind && entry.index == 0 && entry.part == 0) {
+      volume->levels_[0].page_bytes += entry.length;
+      volume->levels_[0].end = end();
+    }
     if (!model && !part) continue;
     size_t* slot = nullptr;
     if (entry.index < static_cast<uint32_t>(levels)) {
@@ -104,7 +111,7 @@ Result<std::shared_ptr<const PackedVolume>> PackedVolume::open(std::shared_ptr<c
     *slot = i;
     PackedLevel& level = volume->levels_[entry.index];
     (part ? level.page_bytes : level.model_bytes) += entry.length;
-    level.end = i + 1 < table.size() ? table[i + 1].offset : container->file_bytes();
+    level.end = end();
   }
   // Of a file that was cut the finest levels have no pages at all.
   const auto absent = [&](const PackedPages::Level& level) {
@@ -199,6 +206,9 @@ std::optional<Voxel> PackedVolume::uniform(const Box& box, int level) const {
 
 Status PackedVolume::check(Context& ctx) const {
   for (size_t i = 0; i < container_->table().size(); ++i) VOX_CHECK(container_->chunk(i));
+  VOX_TRY(const auto ranges, page_ranges(*this));
+  std::mutex mutex;
+  PageRanges::Range all{1, 0};
   for (auto level = static_cast<size_t>(finest_); level < pages_->levels.size(); ++level) {
     const PageGrid& grid = pages_->levels[level].grid;
     constexpr int64_t run = 32;  // pages
@@ -207,9 +217,31 @@ Status PackedVolume::check(Context& ctx) const {
       const Index3 lo = Index3(i % runs.x * run, i / runs.x % runs.y, i / (runs.x * runs.y)) * grid.side;
       const Box box{lo, glm::min(lo + Index3(run, 1, 1) * grid.side, grid.dims)};
       std::vector<std::byte> voxels(static_cast<size_t>(box.voxels() * voxel_bytes(info_.format)));
-      return decode(box, static_cast<int>(level), packed(voxels.data(), box.size(), info_.format));
+      const VoxelSpan out = packed(voxels.data(), box.size(), info_.format);
+      VOX_CHECK(decode(box, static_cast<int>(level), out));
+      if (level > 0 || !ranges) return {};
+      for (int64_t x = lo.x; x < box.hi.x; x += grid.side) {
+        const uint64_t number = grid.number(Index3(x, lo.y, lo.z) / grid.side);
+        const PageRanges::Range& said = ranges->pages[number];
+        const ConstVoxelSpan page{out.data + (x - lo.x) * voxel_bytes(info_.format), out.row_stride,
+                                  out.slice_stride};
+        const auto found = range_of(page, grid.box(number).size(), info_.format);
+        if (found.lo > found.hi) continue;
+        if (!(said.lo <= found.lo && found.hi <= said.hi))
+          return tl::unexpected<Error>(at_page(
+              *container_, 0, number, grid, {ErrorCode::input, {}, "values that chunk RNGE does not say"}));
+        const std::lock_guard lock(mutex);
+        all = merged(all, found);
+      }
+      return {};
     }));
   }
+  const ValueRange found = all.lo <= all.hi
+                               ? ValueRange{static_cast<double>(all.lo), static_cast<double>(all.hi)}
+                               : ValueRange{1, 0};
+  if (ranges && ranges->all != found)
+    return bad_input(container_->name(), fmt::format("chunk RNGE 0.0: values of {} to {}: expected {} to {}",
+                                                     ranges->all.lo, ranges->all.hi, found.lo, found.hi));
   return {};
 }
 

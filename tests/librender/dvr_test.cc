@@ -402,6 +402,35 @@ TEST(Dvr, TheUnitOfValuesDoesNotMatter) {
     }
 }
 
+/// Noise that a transfer function does not show, around what it shows: pages of noise alone are not decoded.
+TEST(Dvr, OfPackedVolumesOnlyPagesThatMayShowSomethingAreDecoded) {
+  const VolumeInfo info = vq::test::integer_info({64, 64, 64}, 8);
+  std::vector<std::byte> voxels(static_cast<size_t>(info.dims.x * info.dims.y * info.dims.z));
+  std::mt19937 random(4);
+  for (size_t i = 0; i < voxels.size(); ++i) {
+    const size_t x = i % 64, y = i / 64 % 64, z = i / 4096;
+    const bool shown = x > 18 && x < 30 && y > 18 && y < 30 && z > 18 && z < 30;
+    voxels[i] = static_cast<std::byte>(shown ? 200 + random() % 20 : random() % 60);
+  }
+  voxkit::test::MemorySource source(info, voxels);
+  const TransferFunction transfer = ramp(100, 180);
+  const auto file = svmm::test::open(svmm::test::encode(source, {.levels = false}).bytes);
+  const DvrScene packed = scene_of(file, transfer), plain = scene_of(dense(source), transfer);
+  EXPECT_EQ(packed.visible_bricks(), plain.visible_bricks());
+  EXPECT_EQ(packed.volume().ranges().all(), plain.volume().ranges().all());
+  // One of 64, and those that samples between it and the next ones reach.
+  EXPECT_GT(packed.pages_decoded(), 0u);
+  EXPECT_LE(packed.pages_decoded(), 27u);
+  EXPECT_EQ(file->pages_decoded(), packed.pages_decoded());
+  const Camera camera = Camera::orbit(20, 15, 1.4, 45);
+  expect_same(draw(packed, camera, small()), draw(plain, camera, small()));
+  EXPECT_LE(file->pages_decoded(), 27u);
+  DvrOptions all = small();
+  all.skip = false;
+  expect_same(draw(packed, camera, all), draw(plain, camera, small()));
+  EXPECT_EQ(file->pages_decoded(), 64u);
+}
+
 TEST(Dvr, WhatIsNoNumberIsVoidAndChangesNothingElse) {
   const Index3 dims(12, 11, 10);
   const VolumeInfo info = voxkit::test::scalar_info(dims, SampleType::f32);

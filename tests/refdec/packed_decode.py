@@ -221,9 +221,40 @@ class Packed:
         return struct.pack("<f", min(max(value, -GREATEST_FLOAT), GREATEST_FLOAT))
 
 
+    def finite(self, code):
+        """Whether a code stands for a finite number."""
+        if self.codes == ORDERED:
+            return math.isfinite(struct.unpack("<f", self.stored(code))[0])
+        return self.codes == INTEGERS or code >= 3
+
+    def check_ranges(self):
+        """Whether chunk RNGE says which codes the pages of level 0 have."""
+        key = b"RNGE", 0, 0
+        if key not in self.container.chunks or self.volume.colour or self.finest > 0:
+            return
+        data = self.content(key)
+        require(len(data) >= 8, "chunk RNGE: {} bytes", len(data))
+        least, greatest = struct.unpack("<2I", data[:8])
+        step, at, seen = (greatest - least) // 256 + 1, 8, set()
+        for place in itertools.product(*map(range, self.pages(0)[::-1])):
+            if len(self.page(0, place[::-1], 0)) <= self.models[0][0].value_bytes:
+                continue
+            require(at + 2 <= len(data), "chunk RNGE: fewer pages than are coded")
+            codes = {code for code in self.decoded(0, place[::-1], 0) if self.finite(code)}
+            seen |= codes
+            low, high = (least + data[at] * step, least + data[at + 1] * step + step - 1)
+            require(all(low <= code <= high for code in codes), "chunk RNGE: byte {}: other codes than are there", at)
+            at += 2
+        require(at == len(data), "chunk RNGE: more pages than are coded")
+        require((least, greatest) == (min(seen), max(seen)) if seen else least > greatest,
+                "chunk RNGE: codes of {} to {}", least, greatest)
+
+
 def decode(packed, level):
     """The voxels of a level."""
     require(level >= packed.finest, "level {}: its chunks PAGE are missing: the file was cut", level)
+    if level == 0 and packed.strict:
+        packed.check_ranges()
     dims, size = packed.dims(level), packed.volume.voxel_bytes
     out = bytearray(math.prod(dims) * size)
     for z, y, x in itertools.product(*map(range, packed.pages(level)[::-1])):
