@@ -127,8 +127,9 @@ Status load_pictures(MeshParts& parts, const std::string& path, MeshFolder& fold
     if (!reference.bytes.empty()) {
       picture = decode_picture(path, reference.bytes, ctx);
     } else {
-      VOX_TRY(const std::string file,
-              folder.find(reference.name, fmt::format("material {}: its texture", material)));
+      VOX_TRY(
+          const std::string file,
+          folder.find(reference.name, fmt::format("material {}: its texture", material), reference.library));
       if (file.empty())
         return bad_input(
             path, fmt::format("material {}: its texture {} is missing: expected it beside the mesh", material,
@@ -141,7 +142,9 @@ Status load_pictures(MeshParts& parts, const std::string& path, MeshFolder& fold
   };
   // Embedded pictures have names of their own.
   const auto key_of = [](const PictureReference& r) {
-    return r.used() ? fmt::format("{}\n{} {} {}", r.name, r.base, r.gain, static_cast<int>(r.channel)) : "";
+    return r.used() ? fmt::format("{}\n{}\n{} {} {}", r.library, r.name, r.base, r.gain,
+                                  static_cast<int>(r.channel))
+                    : "";
   };
   std::map<std::pair<std::string, std::string>, int32_t> known;
   const auto picture_of = [&](const PictureReference& color, const PictureReference& opacity,

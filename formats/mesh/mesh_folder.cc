@@ -68,29 +68,39 @@ std::string unescaped(const std::string& text) {
 MeshFolder::MeshFolder(const std::string& path, bool allow_outside)
     : path_(path), folder_(fs::path(path).parent_path().string()), allow_outside_(allow_outside) {}
 
-Result<std::string> MeshFolder::find(const std::string& name, const std::string& what) {
+Result<std::string> MeshFolder::find(const std::string& name, const std::string& what,
+                                     const std::string& by) {
   std::string slashes = name;
   std::replace(slashes.begin(), slashes.end(), '\\', '/');
   const auto bad = [&](const char* why) {
     return bad_input(path_, fmt::format("{} \"{}\": {}", what, name.substr(0, 200), why));
   };
   const fs::path base(folder_);
+  // From the folder of the mesh to that of what has the name, and then itself.
+  std::vector<fs::path> folders;
+  if (!by.empty())
+    folders.push_back(fs::path(by).parent_path().lexically_normal().lexically_relative(
+        base.empty() ? "." : base.lexically_normal()));
+  folders.emplace_back();
   bool forbidden = false, is_there = false;
-  for (const std::string& written : {slashes, unescaped(slashes)}) {
-    if (written.empty() || written.find('\0') != std::string::npos) continue;
-    if (!allow_outside_ && leaves_folder(folder_, written)) {
-      forbidden = true;
-    } else if (const fs::path found = find_in_any_case(base / written); !found.empty()) {
-      return found.string();
-    } else {
-      std::error_code error;
-      is_there |= fs::exists(base / written, error);
+  const std::string all_written[] = {slashes, unescaped(slashes)};
+  for (const bool last_part : {false, true})
+    for (const std::string& written : all_written) {
+      if (written.empty() || written.find('\0') != std::string::npos) continue;
+      for (const fs::path& from : folders) {
+        const fs::path file = from / (last_part ? fs::path(written).filename() : fs::path(written));
+        if (!allow_outside_ && leaves_folder(folder_, file.string())) {
+          forbidden = true;
+          continue;
+        }
+        if (const fs::path found = find_in_any_case(base / file); !found.empty()) {
+          if (last_part) moved_.insert(name);
+          return found.string();
+        }
+        std::error_code error;
+        is_there |= !last_part && fs::exists(base / file, error);
+      }
     }
-    if (const fs::path found = find_in_any_case(base / fs::path(written).filename()); !found.empty()) {
-      moved_.insert(name);
-      return found.string();
-    }
-  }
   if (forbidden) return bad("lies outside of the mesh's folder: expected --allow-outside");
   if (is_there) return bad("is not a regular file");
   return std::string();

@@ -194,6 +194,7 @@ class MtlReader {
     if (left.size() > 1 && left.front() == '"' && left.back() == '"') left = left.substr(1, left.size() - 2);
     if (left.empty()) return bad("a map without the name of its file");
     out.picture.name = left;
+    out.picture.library = path_;
     return out;
   }
 

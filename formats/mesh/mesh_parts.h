@@ -14,6 +14,7 @@ namespace voxkit {
 /// A picture that a mesh uses: a file, or bytes in the mesh's own files.
 struct PictureReference {
   std::string name;                   ///< as the mesh has it; for errors where it is embedded
+  std::string library;                ///< the file of materials that has the name; empty: the mesh itself
   std::span<const std::byte> bytes;   ///< of an embedded picture; empty for a file of its own
   std::shared_ptr<const void> owner;  ///< of these
   /// A stored value v becomes base + gain * v, 0..1 (-mm of .mtl files).

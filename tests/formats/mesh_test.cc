@@ -417,6 +417,30 @@ TEST_F(MeshFileTest, FilesOutsideOfTheFolderNeedLeave) {
               1);
 }
 
+TEST_F(MeshFileTest, TexturesAreBesideTheLibraryThatNamesThem) {
+  std::filesystem::create_directories(path("sub/materials/pictures"));
+  picture("sub/materials/pictures/wall.png", {0, 1, 1, 1});
+  const std::string obj = obj_square("mtllib materials/m.mtl\nusemtl a\n");
+  const auto alpha_of = [&](const Mesh& mesh) {
+    EXPECT_FALSE(has_note(mesh, "taken from beside"));
+    return mesh.pictures[0].has_alpha;
+  };
+  for (const char* name : {"pictures/wall.png", "../materials/pictures/wall.png", "./Pictures/WALL.png"}) {
+    put("sub/materials/m.mtl", fmt::format("newmtl a\nmap_Kd {}\n", name));
+    EXPECT_TRUE(alpha_of(read("sub/a.obj", obj))) << name;
+  }
+  // Names that are meant from the mesh on, as some write them; the library's folder comes first.
+  picture("sub/tile.png");
+  put("sub/materials/m.mtl", "newmtl a\nmap_Kd tile.png\n");
+  EXPECT_FALSE(alpha_of(read("sub/a.obj", obj)));
+  picture("sub/materials/tile.png", {0, 1, 1, 1});
+  EXPECT_TRUE(alpha_of(read("sub/a.obj", obj)));
+  // Out of the mesh's folder it is no more allowed than ever.
+  picture("out.png");
+  put("sub/materials/m.mtl", "newmtl a\nmap_Kd ../../out.png\n");
+  expect_error("sub/a.obj", obj, "lies outside of the mesh's folder: expected --allow-outside");
+}
+
 TEST_F(MeshFileTest, NumbersThatAreNone) {
   for (const char* bad : {"nan", "inf", "-inf", "1e39"}) {
     expect_error("a.obj", fmt::format("v 0 0 0\nv 1 0 {}\nv 0 1 0\nf 1 2 3\n", bad),
