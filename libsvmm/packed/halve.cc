@@ -5,6 +5,7 @@
 #include <cmath>
 #include <cstring>
 #include <limits>
+#include <optional>
 
 #include "formats/copy.h"
 #include "formats/parallel.h"
@@ -31,10 +32,11 @@ float mean_of(const float* values, int count) {
   return counted == 0 ? std::numeric_limits<float>::quiet_NaN() : static_cast<float>(sum / counted);
 }
 template <class T>
-T commonest_of(const std::array<T, 8>& values, int count) {
+T commonest_of(const std::array<T, 8>& values, int count, std::optional<T> fill) {
   T best = values[0];
   for (int i = 0, most = 0; i < count; ++i) {
     const T value = values[static_cast<size_t>(i)];
+    if (fill && value == *fill) continue;
     const auto times = static_cast<int>(std::count(values.begin(), values.begin() + count, value));
     if (times > most || (times == most && value < best)) most = times, best = value;
   }
@@ -50,9 +52,13 @@ void halve_row(const T* const* rows, int row_count, int64_t nx, Rule rule, int64
     for (int r = 0; r < row_count; ++r)
       for (int64_t i = x; i < std::min(x + 2, nx); ++i) values[static_cast<size_t>(count++)] = rows[r][i];
     if constexpr (std::is_same_v<T, float>)
-      *out++ = rule == Rule::commonest ? commonest_of(values, count) : mean_of(values.data(), count);
+      *out++ = rule == Rule::commonest ? commonest_of<float>(values, count, std::nullopt)
+                                       : mean_of(values.data(), count);
     else
-      *out++ = rule == Rule::commonest ? commonest_of(values, count) : mean_of(values.data(), count, fill);
+      *out++ =
+          rule == Rule::commonest
+              ? commonest_of<T>(values, count, fill < 0 ? std::nullopt : std::optional(static_cast<T>(fill)))
+              : mean_of(values.data(), count, fill);
   }
 }
 

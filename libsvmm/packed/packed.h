@@ -70,10 +70,13 @@ struct Channels {
 struct PackedParams {
   int page_side = 16;
   ValueMap map;          ///< from voxels to the samples that pages hold
-  Channels channels;     ///< of colours
+  Channels channels;     ///< of colours, if they have any
   bool opaque = false;   ///< of RGBA32: whether all solid voxels of level 0 have an alpha of 255
   double max_error = 0;  ///< promised; for the reader's information
   int levels = 1;
+
+  /// Whether pages have a mask and channels; else they have codes.
+  bool has_channels() const { return map.kind == CodeKind::colors; }
 };
 
 /// A level of an opened file.

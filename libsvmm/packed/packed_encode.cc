@@ -16,7 +16,9 @@
 #include "libpage/page.h"
 #include "libsvmm/packed/color_encode.h"
 #include "libsvmm/packed/halve.h"
+#include "libsvmm/packed/indexed_colors.h"
 #include "libsvmm/packed/packed_layout.h"
+#include "libsvmm/packed/page_codes.h"
 #include "libsvmm/packed/page_ranges.h"
 #include "libsvmm/packed/raster.h"
 #include "libsvmm/packed/survey.h"
@@ -40,136 +42,23 @@ constexpr uint64_t most_pages_without_ranges = 8;
 /// Of a target: small volumes may need the third.
 constexpr int most_attempts = 3;
 
-/// Reads pages of a level as codes.
-class PageReader {
- public:
-  /// What is read goes through `raster`.
-  PageReader(VolumeSource& source, const PageGrid& grid, const PackedParams& params, const Raster& raster)
-      : source_(source), grid_(grid), params_(params), raster_(raster) {}
-
-  /// The sum of squared differences between the voxels of the page that was read last and what their codes
-  /// stand for; where both are finite.
-  double squared_error() const { return squared_error_; }
-
-  /// Reads the pages `first` to `last`, which are in one row, and calls take(number, codes, extent) for each.
-  template <class Take>
-  Status read(uint64_t first, uint64_t last, const Take& take) {
-    const Box row{grid_.box(first).lo, grid_.box(last - 1).hi};
-    const VoxelFormat format = source_.info().format;
-    voxels_.resize(static_cast<size_t>(row.voxels() * voxel_bytes(format)));
-    const VoxelSpan span = packed(voxels_.data(), row.size(), format);
-    if (const auto value = source_.uniform(row))
-      fill(span, row.size(), format, *value);
-    else
-      VOX_CHECK(source_.read(row, span));
-    for (uint64_t number = first; number < last; ++number) {
-      const Box box = grid_.box(number);
-      const ConstVoxelSpan at{span.data + (box.lo.x - row.lo.x) * voxel_bytes(format), span.row_stride,
-                              span.slice_stride};
-      VOX_CHECK(format == VoxelFormat::float32     ? codes_of_floats(at, box.size(), number, take)
-                : format == VoxelFormat::density16 ? codes_of<uint16_t>(at, box.size(), number, take)
-                                                   : codes_of<uint8_t>(at, box.size(), number, take));
-    }
-    return {};
-  }
-
- private:
-  template <class T, class Take>
-  Status codes_of(ConstVoxelSpan in, Index3 size, uint64_t number, const Take& take) {
-    T codes[page::max_voxels];
-    T* out = codes;
-    for (int64_t z = 0; z < size.z; ++z)
-      for (int64_t y = 0; y < size.y; ++y, out += size.x)
-        std::memcpy(out, in.row(y, z), static_cast<size_t>(size.x) * sizeof(T));
-    if (!raster_.empty())
-      for (T* code = codes; code != out; ++code) *code = static_cast<T>(raster_(*code));
-    return take(number, std::span<const T>(codes, out), grid_.extent(number));
-  }
-  template <class Take>
-  Status codes_of_floats(ConstVoxelSpan in, Index3 size, uint64_t number, const Take& take) {
-    uint32_t codes[page::max_voxels];
-    uint32_t* out = codes;
-    squared_error_ = 0;
-    for (int64_t z = 0; z < size.z; ++z)
-      for (int64_t y = 0; y < size.y; ++y) {
-        const auto* const row = reinterpret_cast<const float*>(in.row(y, z));
-        for (int64_t x = 0; x < size.x; ++x) {
-          *out = params_.map.code(row[x]);
-          if (params_.map.kind == CodeKind::steps && std::isfinite(row[x])) {
-            const double error = static_cast<double>(params_.map.value(*out)) - static_cast<double>(row[x]);
-            if (!(std::abs(error) <= params_.max_error))
-              return fail(ErrorCode::internal, {}, "a step further than the bound");
-            squared_error_ += error * error;
-          }
-          ++out;
-        }
-      }
-    return take(number, std::span<const uint32_t>(codes, out), grid_.extent(number));
-  }
-
-  VolumeSource& source_;
-  const PageGrid& grid_;
-  const PackedParams& params_;
-  const Raster& raster_;
-  std::vector<std::byte> voxels_;
-  double squared_error_ = 0;
-};
-
-/// Of a page that was read, and decoded again.
-template <class T>
-double squared_error(const PageReader& reader, std::span<const T> codes, std::span<const T> decoded) {
-  if constexpr (sizeof(T) == 4) return reader.squared_error();  // codes of floats are kept
-  uint64_t sum = 0;
-  for (size_t i = 0; i < decoded.size(); ++i) {
-    const int64_t error = int64_t{codes[i]} - int64_t{decoded[i]};
-    sum += static_cast<uint64_t>(error * error);
-  }
-  return static_cast<double>(sum);
-}
-
-/// The codes of a coarser level as they were decoded, in a temporary file, page by page.
-class DecodedLevel {
- public:
-  DecodedLevel(int level, const PageGrid& grid, int code_bytes)
-      : level_(level),
-        grid_(grid),
-        stride_(static_cast<size_t>(grid.side * grid.side * grid.side * code_bytes)) {}
-  int level() const { return level_; }
-  size_t page_bytes() const { return stride_; }
-  /// Pages in order, each of `page_bytes()`.
-  Status write(std::span<const std::byte> pages) { return file_.write(pages); }
-  Status finish() {
-    VOX_TRY(mapped_, file_.map());
-    return {};
-  }
-  /// Planes of pages before this one are not needed any more.
-  void release(int64_t plane) const {
-    release_bytes(mapped_->bytes().first(grid_.number({0, 0, plane}) * stride_));
-  }
-  /// The parents of a page of the next finer level.
-  template <class T>
-  page::Parent<T> parent_of(Index3 child) const {
-    const uint64_t number = grid_.number(child / int64_t{2});
-    page::Parent<T> parent = placed<T>(child, grid_);
-    parent.samples = {reinterpret_cast<const T*>(mapped_->bytes().data() + number * stride_),
-                      static_cast<size_t>(parent.extent.voxels())};
-    return parent;
-  }
-
- private:
-  int level_;
-  PageGrid grid_;
-  size_t stride_;
-  TemporaryFile file_{"a coarser level"};
-  std::shared_ptr<const MappedFile> mapped_;
-};
-
 class Encoder {
  public:
   Encoder(VolumeSource& source, const PackedOptions& options, Context& ctx)
-      : source_(source), info_(source.info()), ctx_(ctx), survey_(info_.format) {
+      : source_(source), info_(source.info()), written_(info_), ctx_(ctx), survey_(info_.format) {
     params_.page_side = options.page_side;
     params_.levels = options.levels ? level_count(info_.dims, options.page_side) : 1;
+  }
+  /// `numbers` of the colors of a volume of that info.
+  Encoder(VolumeSource& numbers, const VolumeInfo& info, const std::vector<Voxel>& colors,
+          const PackedOptions& options, Context& ctx)
+      : Encoder(numbers, options, ctx) {
+    written_ = info;
+    params_.map.kind = CodeKind::indexed;
+    params_.map.colors = std::make_shared<const std::vector<Voxel>>(colors);
+    params_.opaque =
+        info.format == VoxelFormat::rgba32 &&
+        std::ranges::all_of(colors, [](const Voxel& color) { return color.bytes[3] == std::byte{255}; });
   }
 
   Result<PackedParams> run(double max_error, const ByteSink& sink) {
@@ -239,9 +128,15 @@ class Encoder {
     ranges_.clear();
     VOX_CHECK(set_bound(max_error));
     if (params_.map.kind == CodeKind::steps) VOX_CHECK(choose_map());
-    ContainerWriter container(sink, Codec::svmm, container_version_for(info_), 0, *ctx_.memory);
-    VOX_CHECK(add_volume_info(container, info_));
+    ContainerWriter container(sink, Codec::svmm, container_version_for(written_), 0, *ctx_.memory);
+    VOX_CHECK(add_volume_info(container, written_));
     VOX_CHECK(container.add(packed_kind, 0, 0, pack_params(params_)));
+    if (params_.map.colors) {
+      std::vector<std::byte> table;
+      for (const Voxel& color : *params_.map.colors)
+        table.insert(table.end(), color.bytes.begin(), color.bytes.begin() + voxel_bytes(written_.format));
+      VOX_CHECK(container.add(color_table_kind, 0, 0, table));
+    }
     // The coarsest level has no parents; the model of those between is fitted to the largest of them.
     const int top = params_.levels - 1;
     std::optional<page::Model> model;
@@ -364,7 +259,7 @@ class Encoder {
 
   /// Of floats: steps within the bound, or, where these take more bytes, all bits.
   Status choose_map() {
-    const ValueMap steps = params_.map, ordered{CodeKind::ordered, 0, 1};
+    const ValueMap steps = params_.map, ordered{CodeKind::ordered, 0, 1, {}};
     params_.map = ordered;
     VOX_TRY(const page::Model exact, fit(0));
     VOX_TRY(const Sampled all_bits, encode_samples(0, exact));
@@ -549,6 +444,7 @@ class Encoder {
 
   VolumeSource& source_;
   const VolumeInfo info_;
+  VolumeInfo written_;  ///< what the file is one of
   Context& ctx_;
   PackedParams params_;
   Survey survey_;
@@ -561,6 +457,31 @@ class Encoder {
   double squared_error_ = 0;               ///< of level 0
   std::vector<CodeRange> ranges_;          ///< of the coded pages of level 0
 };
+
+/// Few colors are coded both ways, as names and by their channels, and the smaller file is kept.
+Result<PackedParams> encode_colors(VolumeSource& source, const PackedOptions& options, const ByteSink& sink,
+                                   Context& ctx) {
+  VOX_TRY(const auto colors, few_colors(source, ctx));
+  if (!colors || colors->empty()) return encode_packed_colors(source, options, sink, ctx);
+  struct Way {
+    PackedParams params;
+    uint64_t bytes = 0;
+    TemporaryFile file{"the compressed volume"};
+  } indexed, channels;
+  const auto into = [](Way& way) {
+    return [&way](std::span<const std::byte> bytes) {
+      way.bytes += bytes.size();
+      return way.file.write(bytes);
+    };
+  };
+  const auto numbers = numbers_of(source, *colors);
+  VOX_TRY(indexed.params, Encoder(*numbers, source.info(), *colors, options, ctx).run(0.0, into(indexed)));
+  VOX_TRY(channels.params, encode_packed_colors(source, options, into(channels), ctx));
+  Way& smaller = indexed.bytes <= channels.bytes ? indexed : channels;
+  VOX_TRY(const auto file, smaller.file.map());
+  VOX_CHECK(sink(file->bytes()));
+  return smaller.params;
+}
 
 }  // namespace
 
@@ -592,7 +513,7 @@ Result<PackedParams> encode_packed(VolumeSource& source, const PackedOptions& op
         "integers with a fill value, which is to come back as it is: expected a bound of 0 (--max-error 0 or "
         "--quality 100)");
   if (source.forward_only()) return fail(ErrorCode::internal, {}, "a source that was not spooled");
-  if (is_color(info.format)) return encode_packed_colors(source, options, sink, ctx);
+  if (is_color(info.format)) return encode_colors(source, options, sink, ctx);
   Encoder encoder(source, options, ctx);
   return options.target ? encoder.run(*options.target, sink) : encoder.run(options.max_error, sink);
 }

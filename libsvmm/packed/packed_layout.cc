@@ -54,10 +54,8 @@ std::vector<std::byte> pack_params(const PackedParams& p) {
   bytes[0] = static_cast<std::byte>(std::countr_zero(static_cast<unsigned>(p.page_side)));
   bytes[1] = static_cast<std::byte>(p.levels);
   bytes[2] = static_cast<std::byte>(p.map.kind);
-  if (p.map.kind == CodeKind::colors) {
-    bytes[3] = static_cast<std::byte>(p.opaque);
-    bytes[4] = static_cast<std::byte>(p.channels.differences);
-  }
+  bytes[3] = static_cast<std::byte>(p.opaque);
+  if (p.has_channels()) bytes[4] = static_cast<std::byte>(p.channels.differences);
   store_le(&bytes[8], p.map.lo);
   store_le(&bytes[16], p.map.step);
   store_le(&bytes[24], p.max_error);
@@ -81,15 +79,15 @@ Result<PackedParams> unpack_packed_params(std::span<const std::byte> bytes, cons
     return bad(1, fmt::format("{} levels: expected 1 or {}", p.levels, most));
   const auto kind = std::to_integer<uint8_t>(bytes[2]);
   const bool floats = info.format == VoxelFormat::float32;
-  if (is_color(info.format) ? kind != 4 : floats ? kind != 2 && kind != 3 : kind != 1)
+  if (is_color(info.format) ? kind != 4 && kind != 5 : floats ? kind != 2 && kind != 3 : kind != 1)
     return bad(2, fmt::format("unknown kind of codes {}", kind));
   const int opaque = std::to_integer<int>(bytes[3]);
   if (opaque > 1 || (opaque == 1 && info.format != VoxelFormat::rgba32))
     return bad(3, fmt::format("opaque {}: expected 0, or of RGBA32 0 or 1", opaque));
   p.opaque = opaque == 1;
   const int differences = std::to_integer<int>(bytes[4]);
-  if (is_color(info.format) ? differences > 1 : differences != 0)
-    return bad(4, fmt::format("differences {}: expected 0, or of colours 0 or 1", differences));
+  if (kind == 4 ? differences > 1 : differences != 0)
+    return bad(4, fmt::format("differences {}: expected 0, or of channels of colours 0 or 1", differences));
   p.channels.differences = differences == 1;
   p.channels.count = info.format == VoxelFormat::rgba32 ? 4 : 3;
   p.map.kind = static_cast<CodeKind>(kind);

@@ -23,6 +23,8 @@ inline constexpr uint32_t pages_kind = chunk_kind("PAGE");  ///< index: level; p
 /// Of colours: the masks of pages and their model, as those two. MODL has a part for each channel.
 inline constexpr uint32_t mask_kind = chunk_kind("MASK");
 inline constexpr uint32_t mask_model_kind = chunk_kind("MMOD");
+/// Of indexed colours: these.
+inline constexpr uint32_t color_table_kind = chunk_kind("CTAB");
 
 inline Index3 level_dims(Index3 dims, int level) {
   const int64_t factor = int64_t{1} << level;

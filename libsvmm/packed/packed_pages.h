@@ -51,6 +51,9 @@ struct PackedPages {
   }
 };
 
+/// The voxel that a code of scalars, or of indexed colours, stands for.
+Voxel voxel_of(uint32_t code, const ValueMap& map, VoxelFormat format);
+
 /// Puts the codes of a page where its voxels go, as far as they are in `box`; `out` is at the box's corner.
 template <class T>
 void place(const T* codes, const Box& page, const Box& box, const ValueMap& map, VoxelFormat format,
@@ -64,7 +67,11 @@ void place(const T* codes, const Box& page, const Box& box, const ValueMap& map,
       std::byte* const to =
           out.row(y - box.lo.y, z - box.lo.z) + (part.lo.x - box.lo.x) * voxel_bytes(format);
       const auto count = static_cast<size_t>(part.hi.x - part.lo.x);
-      if constexpr (sizeof(T) < 4) {
+      if (map.kind == CodeKind::indexed) {
+        const auto bytes = static_cast<size_t>(voxel_bytes(format));
+        for (size_t x = 0; x < count; ++x)
+          std::memcpy(to + x * bytes, voxel_of(from[x], map, format).bytes.data(), bytes);
+      } else if constexpr (sizeof(T) < 4) {
         std::memcpy(to, from, count * sizeof(T));
       } else {
         auto* const floats = reinterpret_cast<float*>(to);
@@ -87,9 +94,6 @@ struct Ancestors
     return {~level, number};  // beside ColorPage, which parents are kept as
   }
 };
-
-/// The voxel that a code of scalars stands for.
-Voxel voxel_of(uint32_t code, const ValueMap& map, VoxelFormat format);
 
 /// Calls work(T()) with the type of codes of a format.
 template <class Work>
@@ -125,7 +129,11 @@ Status decode_scalars(const Container& container, const PackedPages& pages, cons
 Result<Voxel> sample_scalar(const Container& container, const PackedPages& pages, const PackedParams& params,
                             VoxelFormat format, Index3 voxel, int level);
 
-/// Of files of colours.
+/// Of indexed colours, as visit_masks.
+Status visit_solid(const PackedVolume& volume,
+                   const std::function<Status(Index3 lo, const page::Mask& mask)>& take, Context& ctx);
+
+/// Of files of colours that have channels.
 Status decode_colors(const Container& container, const PackedPages& pages, const PackedParams& params,
                      const Box& box, int level, VoxelSpan out);
 Result<Voxel> sample_color(const Container& container, const PackedPages& pages, const PackedParams& params,

@@ -1,7 +1,10 @@
 // Voxels of an opened file for one thread, which asks for what lies together.
 #include <array>
 #include <bit>
+#include <cstring>
+#include <glm/common.hpp>
 
+#include "formats/parallel.h"
 #include "libpage/page.h"
 #include "libsvmm/packed/packed_pages.h"
 
@@ -45,7 +48,7 @@ static Result<const PackedVolume::Reader::Recent::Page*> recent_page(const Packe
 
 Result<Voxel> PackedVolume::Reader::at(Index3 voxel) {
   const VoxelFormat format = volume_.info().format;
-  if (is_color(format))
+  if (volume_.params().has_channels())
     return sample_color(volume_.container(), volume_.pages(), volume_.params(), voxel, level_,
                         recent_->ancestors);
   const PackedPages::Level& l = volume_.pages().levels[static_cast<size_t>(level_)];
@@ -66,7 +69,7 @@ Result<PackedPage> PackedVolume::Reader::page(Index3 voxel) {
   const Index3 at(voxel.x >> log2_side, voxel.y >> log2_side, voxel.z >> log2_side);
   PackedPage page;
   page.lo = at * l.grid.side;
-  if (is_color(volume_.info().format)) {
+  if (volume_.params().has_channels()) {
     const uint64_t number = l.grid.number(at);
     VOX_TRY(const auto mask, volume_.pages().entry(volume_.container(), level_, l.masks, number));
     page.uniform = mask.empty();
@@ -110,6 +113,35 @@ Status PackedVolume::Reader::read(const Box& box, VoxelSpan out) {
         });
       }
   return {};
+}
+
+Status visit_solid(const PackedVolume& volume,
+                   const std::function<Status(Index3 lo, const page::Mask& mask)>& take, Context& ctx) {
+  const Index3 dims = volume.info().dims,
+               bricks = (dims + int64_t{page::max_side - 1}) / int64_t{page::max_side};
+  return parallel_for(ctx, bricks.y * bricks.z, [&](int64_t row) -> Status {
+    PackedVolume::Reader reader(volume, 0);
+    std::array<std::byte, page::max_voxels * sizeof(uint32_t)> bytes;
+    const auto each = static_cast<size_t>(voxel_bytes(volume.info().format));
+    for (int64_t i = 0; i < bricks.x; ++i) {
+      const Index3 lo = Index3(i, row % bricks.y, row / bricks.y) * int64_t{page::max_side};
+      const Box box{lo, glm::min(lo + int64_t{page::max_side}, dims)};
+      const auto one = volume.uniform(box, 0);
+      if (one && *one == Voxel{}) continue;
+      const VoxelSpan out = packed(bytes.data(), box.size(), volume.info().format);
+      VOX_CHECK(reader.read(box, out));
+      page::Mask mask;
+      for (int z = 0; z < box.size().z; ++z)
+        for (int y = 0; y < box.size().y; ++y)
+          for (int x = 0; x < box.size().x; ++x) {
+            uint32_t bits = 0;
+            std::memcpy(&bits, out.row(y, z) + static_cast<size_t>(x) * each, each);
+            if (bits != 0) mask.set(x, y, z);
+          }
+      if (!mask.empty()) VOX_CHECK(take(lo, mask));
+    }
+    return {};
+  });
 }
 
 }  // namespace voxkit::svmm

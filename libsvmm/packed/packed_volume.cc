@@ -3,10 +3,12 @@
 #include <array>
 #include <atomic>
 #include <cmath>
+#include <cstring>
 #include <mutex>
 
 #include "formats/parallel.h"
 #include "formats/volume_chunks.h"
+#include "libsvmm/packed/indexed_colors.h"
 #include "libsvmm/packed/packed_pages.h"
 #include "libsvmm/packed/page_ranges.h"
 
@@ -54,6 +56,27 @@ bool is_packed(const Container& container) {
 PackedVolume::PackedVolume() = default;
 PackedVolume::~PackedVolume() = default;
 
+/// Chunk CTAB: no color twice, and none that is void.
+static Status read_colors(const Container& container, const VolumeInfo& info, ValueMap& map) {
+  VOX_TRY(const auto bytes, container.only_chunk(color_table_kind));
+  const auto each = static_cast<size_t>(voxel_bytes(info.format));
+  const size_t count = bytes.size() / each;
+  if (bytes.size() % each != 0 || count == 0 || count > most_indexed_colors)
+    return bad_input(container.name(),
+                     fmt::format("chunk CTAB: {} bytes: expected 1 to {} colors of {} bytes", bytes.size(),
+                                 most_indexed_colors, each));
+  std::vector<Voxel> colors(count);
+  for (size_t i = 0; i < count; ++i) {
+    std::memcpy(colors[i].bytes.data(), bytes.data() + i * each, each);
+    const uint32_t before = i == 0 ? 0 : colors[i - 1].as<uint32_t>();
+    if (colors[i].as<uint32_t>() <= before)
+      return bad_input(container.name(),
+                       fmt::format("chunk CTAB, byte {}: expected colors above 0, ascending", i * each));
+  }
+  map.colors = std::make_shared<const std::vector<Voxel>>(std::move(colors));
+  return {};
+}
+
 Result<std::shared_ptr<const PackedVolume>> PackedVolume::open(std::shared_ptr<const Container> container,
                                                                MemoryBudget& memory) {
   const auto bad = [&](const std::string& what) { return bad_input(container->name(), what); };
@@ -65,7 +88,9 @@ Result<std::shared_ptr<const PackedVolume>> PackedVolume::open(std::shared_ptr<c
   volume->pages_ = std::make_unique<PackedPages>(memory);
   PackedPages& pages = *volume->pages_;
   const VoxelFormat format = volume->info_.format;
-  const bool colors = is_color(format);
+  const bool colors = volume->params_.has_channels();
+  if (volume->params_.map.kind == CodeKind::indexed)
+    VOX_CHECK(read_colors(*container, volume->info_, volume->params_.map));
   const Channels of_colors = volume->params_.channels;
   const size_t channels = colors ? of_colors.count : 1;
   const auto& table = container->table();
@@ -150,6 +175,7 @@ Result<std::shared_ptr<const PackedVolume>> PackedVolume::open(std::shared_ptr<c
       if (!model) return bad(fmt::format("chunk MODL {}.{}: {}", i, c, model.error().what));
       const uint64_t most = colors                          ? of_colors.greatest(c)
                             : format == VoxelFormat::bitmap ? 1
+                            : is_color(format)              ? volume->params_.map.colors->size()
                                                             : (uint64_t{1} << 8 * code_bytes(format)) - 1;
       if (model->max_sample() > most)
         return bad(fmt::format("chunk MODL {}.{}: samples up to {}: expected at most {}", i, c,
@@ -178,12 +204,12 @@ Result<std::shared_ptr<const PackedVolume>> PackedVolume::open(std::shared_ptr<c
 
 Status PackedVolume::decode(const Box& box, int level, VoxelSpan out) const {
   if (box.empty()) return {};
-  if (is_color(info_.format)) return decode_colors(*container_, *pages_, params_, box, level, out);
+  if (params_.has_channels()) return decode_colors(*container_, *pages_, params_, box, level, out);
   return decode_scalars(*container_, *pages_, params_, info_.format, box, level, out);
 }
 
 Result<Voxel> PackedVolume::sample(Index3 voxel, int level) const {
-  if (!is_color(info_.format))
+  if (!params_.has_channels())
     return sample_scalar(*container_, *pages_, params_, info_.format, voxel, level);
   Ancestors last;
   return sample_color(*container_, *pages_, params_, voxel, level, last);
@@ -191,7 +217,7 @@ Result<Voxel> PackedVolume::sample(Index3 voxel, int level) const {
 
 std::optional<Voxel> PackedVolume::uniform(const Box& box, int level) const {
   const auto& l = pages_->levels[static_cast<size_t>(level)];
-  const bool colors = is_color(info_.format);
+  const bool colors = params_.has_channels();
   const Index3 first = box.lo / l.grid.side, last = (box.hi + (l.grid.side - 1)) / l.grid.side;
   for (int64_t z = first.z; z < last.z; ++z)
     for (int64_t y = first.y; y < last.y; ++y)
@@ -250,6 +276,7 @@ Status PackedVolume::visit_masks(const std::function<Status(Index3 lo, const pag
   if (!is_color(info_.format))
     return bad_usage(fmt::format("masks of {} voxels: expected colours", name(info_.format)));
   if (finest_ > 0) return bad_usage("masks of a file that was cut: expected level 0");
+  if (!params_.has_channels()) return visit_solid(*this, take, ctx);
   return svmm::visit_masks(*container_, *pages_, take, ctx);
 }
 

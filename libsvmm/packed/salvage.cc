@@ -35,7 +35,7 @@ class SalvagedSource final : public VolumeSource {
   }
 
   Status read(const Box& box, VoxelSpan out) override {
-    if (is_color(info_.format)) {
+    if (volume_->params().has_channels()) {
       read_colors(box, out);
       return {};
     }

@@ -115,6 +115,7 @@ Status decode_box(const Container& container, const PackedPages& pages, const Va
 }  // namespace
 
 Voxel voxel_of(uint32_t code, const ValueMap& map, VoxelFormat format) {
+  if (map.kind == CodeKind::indexed) return code == 0 ? Voxel{} : (*map.colors)[code - 1];
   switch (code_bytes(format)) {
     case 4:
       return Voxel::of(map.value(code));

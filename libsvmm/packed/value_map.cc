@@ -51,11 +51,11 @@ ValueMap ValueMap::for_floats(ValueRange range, double max_error) {
   map.kind = CodeKind::ordered;
   const double step = 2 * (max_error - rounding_of(range)) * (1 - 0x1p-40);
   if (!(step > max_error) || (range.hi - range.lo) / step > most_steps) return map;
-  return {CodeKind::steps, range.lo, step};
+  return {CodeKind::steps, range.lo, step, {}};
 }
 
 ValueMap ValueMap::through_zero() const {
-  return lo < 0 ? ValueMap{kind, -std::ceil(-lo / step) * step, step} : *this;
+  return lo < 0 ? ValueMap{kind, -std::ceil(-lo / step) * step, step, {}} : *this;
 }
 
 double ValueMap::least_error(ValueRange range) {

@@ -2,7 +2,9 @@
 #pragma once
 
 #include <cstdint>
+#include <memory>
 #include <span>
+#include <vector>
 
 #include "formats/result.h"
 #include "formats/volume.h"
@@ -15,11 +17,13 @@ enum class CodeKind : uint8_t {
   ordered = 2,   ///< FLOAT32: its bits, such that codes ascend as floats do; -0 before 0, NaN at both ends
   steps = 3,     ///< FLOAT32: 0 NaN, 1 and 2 the infinities, c >= 3: lo + (c - 3) step, rounded to a float
   colors = 4,    ///< RGBA32, RGB24: a mask and channels (color_page.h)
+  indexed = 5,   ///< these: 0 void, else the number of a color, counted from 1, in bytes
 };
 
 struct ValueMap {
   CodeKind kind = CodeKind::integers;
-  double lo = 0, step = 1;  ///< of steps
+  double lo = 0, step = 1;                           ///< of steps
+  std::shared_ptr<const std::vector<Voxel>> colors;  ///< of indexed ones
 
   /// Codes of `voxels`, `count` of them, of a format that goes with the kind: of BITMAP and DENSITY8 bytes,
   /// of DENSITY16 16 bits, of FLOAT32 32 bits.

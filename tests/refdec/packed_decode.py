@@ -21,8 +21,8 @@ from mask_decode import MaskModel, decode_mask
 from page_decode import Model, decode_page
 
 SVMM = 1
-INTEGERS, ORDERED, STEPS, COLOURS = 1, 2, 3, 4
-CODES = {1: "integers", 2: "ordered", 3: "steps", 4: "colours"}
+INTEGERS, ORDERED, STEPS, COLOURS, INDEXED = 1, 2, 3, 4, 5
+CODES = {1: "integers", 2: "ordered", 3: "steps", 4: "colours", 5: "indexed"}
 CHANNELS = {"RGBA32": 4, "RGB24": 3}
 MASK = -1  # in place of a channel
 page_model, mask_model = lru_cache(maxsize=64)(Model), lru_cache(maxsize=64)(MaskModel)  # of their bytes
@@ -50,26 +50,28 @@ class Packed:
         log_side, self.count, self.codes, self.opaque, self.differences = container.unpack("<5B", at)
         self.lo, self.step, self.max_error = container.unpack("<3d", at + 8)
         fmt = self.volume.format
-        self.channels = CHANNELS.get(fmt, 1)
+        self.masked = self.codes == COLOURS  # pages have masks and channels
+        self.channels = CHANNELS.get(fmt, 1) if self.masked else 1
         require(log_side in (3, 4), "chunk PAKP: byte {}: pages of 2^{}", at, log_side)
         self.side = 1 << log_side
         most = 1
         while max(self.dims(most - 1)) > self.side:
             most += 1
         require(self.count in (1, most), "chunk PAKP: byte {}: {} levels, expected 1 or {}", at + 1, self.count, most)
-        codes = (ORDERED, STEPS) if fmt == "FLOAT32" else (COLOURS,) if self.volume.colour else (INTEGERS,)
+        codes = (ORDERED, STEPS) if fmt == "FLOAT32" else (COLOURS, INDEXED) if self.volume.colour else (INTEGERS,)
         require(self.codes in codes, "chunk PAKP: byte {}: codes {} of {}", at + 2, self.codes, fmt)
         require(self.opaque <= (fmt == "RGBA32"), "chunk PAKP: byte {}: {} of {}", at + 3, self.opaque, fmt)
-        require(self.differences <= self.volume.colour, "chunk PAKP: byte {}: {} of {}", at + 4, self.differences, fmt)
+        require(self.differences <= self.masked, "chunk PAKP: byte {}: {} of {}", at + 4, self.differences, fmt)
         require(self.codes != STEPS or math.isfinite(self.lo) and 0 < self.step < math.inf,
                 "chunk PAKP: byte {}: steps of {} from {}", at + 8, self.step, self.lo)
+        self.table = self.read_table() if self.codes == INDEXED else None
         self.check_chunks()
         self.models, self.masks = [], []  # of each level: the models of its channels, and that of its masks or None
         models = masks = None  # of levels finer than the file has, where it was cut
         for level in range(self.count):
             if (b"MODL", level, 0) in container.chunks:
                 models, masks = [self.read_model(level, part) for part in range(self.channels)], None
-                if self.volume.colour:
+                if self.masked:
                     masks = self.named("chunk MMOD {}".format(level), mask_model, self.content((b"MMOD", level, 0)))
                     require(all(m.parents == masks.parents for m in models),
                             "level {}: only some of its models have parents", level)
@@ -78,6 +80,16 @@ class Packed:
         require(self.models[self.finest] is not None, "chunk table: chunk MODL {} is missing", self.finest)
         require(not models[0].parents, "chunks MODL: the model of level {} has parents", self.count - 1)
         self.known, self.parts = {}, {}  # pages that were decoded, and parts that were read
+
+    def read_table(self):
+        """Chunk CTAB."""
+        chunk, size = self.container.only(b"CTAB"), self.volume.voxel_bytes
+        require(chunk.length % size == 0 and 1 <= chunk.length // size <= 255, "chunk CTAB: {} bytes", chunk.length)
+        data = self.content((b"CTAB", 0, 0))
+        table = [data[i:i + size] for i in range(0, len(data), size)]
+        values = [int.from_bytes(colour, "little") for colour in table]
+        require(all(a < b for a, b in zip([0] + values, values)), "chunk CTAB: colours that do not ascend")
+        return table
 
     def dims(self, level):
         return tuple(divide_up(d, 1 << level) for d in self.volume.dims)
@@ -90,7 +102,7 @@ class Packed:
         return (1 << 19) // self.side**3
 
     def check_chunks(self):
-        kinds = (b"MODL", b"PAGE") + (b"MMOD", b"MASK") * self.volume.colour
+        kinds = (b"MODL", b"PAGE") + (b"MMOD", b"MASK") * self.masked
         unused = {key for key in self.container.chunks if key[0] in kinds}
 
         def use(kind, level, part):
@@ -104,7 +116,7 @@ class Packed:
             if any(key[0] in (b"MODL", b"MMOD") and key[1] == level for key in unused):
                 for part in range(self.channels):
                     use(b"MODL", level, part)
-                if self.volume.colour:
+                if self.masked:
                     use(b"MMOD", level, 0)
             if level < self.finest:
                 continue
@@ -112,7 +124,7 @@ class Packed:
             require(parts <= len(unused), "chunk table: level {}: parts of chunk PAGE are missing", level)
             for part in range(parts):
                 use(b"PAGE", level, part)
-                if self.volume.colour:
+                if self.masked:
                     use(b"MASK", level, part)
         require(not unused, "chunk table: {} chunks of pages or models belong to no level", len(unused))
 
@@ -130,7 +142,7 @@ class Packed:
 
     def read_model(self, level, part):
         model = self.named("chunk MODL {}.{}".format(level, part), page_model, self.content((b"MODL", level, part)))
-        most = GREATEST.get(self.volume.format) or (510 if self.differences and part in (1, 2) else 255)
+        most = len(self.table) if self.table else GREATEST.get(self.volume.format) or (510 if self.differences and part in (1, 2) else 255)
         require(model.greatest_sample <= most, "chunk MODL {}.{}: samples up to {}", level, part, model.greatest_sample)
         return model
 
@@ -167,7 +179,7 @@ class Packed:
 
     def decoded(self, level, at, channel):
         """Of a page the samples of a channel; or its mask, which scalars have none of."""
-        if channel == MASK and not self.volume.colour:
+        if channel == MASK and not self.masked:
             return None
         key = level, at, channel
         if key in self.known:
@@ -211,6 +223,8 @@ class Packed:
             if self.differences:
                 red, blue = red + green - 255, blue + green - 255
             return bytes(min(max(c, 0), 255) for c in (red, green, blue, *alpha))
+        if self.codes == INDEXED:
+            return self.table[code - 1] if code > 0 else bytes(self.volume.voxel_bytes)
         if self.codes == INTEGERS:
             return code.to_bytes(CODE_BYTES[self.volume.format], "little")
         if self.codes == ORDERED:

@@ -48,6 +48,7 @@ std::string_view name(svmm::CodeKind kind) {
   return kind == svmm::CodeKind::integers  ? "integers"
          : kind == svmm::CodeKind::ordered ? "ordered"
          : kind == svmm::CodeKind::colors  ? "colors"
+         : kind == svmm::CodeKind::indexed ? "indexed"
                                            : "steps";
 }
 
@@ -57,6 +58,7 @@ Json params_json(const svmm::PackedParams& params) {
   Json json = Json::object();
   json.set("layout", "packed").set("page", params.page_side).set("levels", params.levels);
   json.set("max_error", params.max_error).set("codes", name(params.map.kind));
+  if (params.map.colors) json.set("colors", params.map.colors->size());
   return json;
 }
 
@@ -76,9 +78,9 @@ Json levels_json(const svmm::PackedVolume& volume) {
 
 std::string levels_text(const svmm::PackedVolume& volume) {
   const svmm::PackedParams& p = volume.params();
-  std::string text =
-      fmt::format("params      layout packed, pages of {0} x {0} x {0}, greatest error {1:.6g}\n",
-                  p.page_side, p.max_error);
+  std::string text = fmt::format(
+      "params      layout packed, pages of {0} x {0} x {0}, greatest error {1:.6g}{2}\n", p.page_side,
+      p.max_error, p.map.colors ? fmt::format(", {} colors", p.map.colors->size()) : std::string());
   text += "level  factor  dims                     pages        bytes    ends at byte\n";
   for (int index = volume.finest(); index < p.levels; ++index) {
     const svmm::PackedLevel& l = volume.levels()[static_cast<size_t>(index)];
