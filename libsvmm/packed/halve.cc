@@ -147,7 +147,11 @@ Result<std::unique_ptr<VolumeSource>> halved(VolumeSource& source,
     VOX_CHECK(read_slab(source, slab, voxels, ctx));
     source.release(slab.lo.z, slab.hi.z);
     const ConstVoxelSpan read{voxels.data, voxels.row_stride, voxels.slice_stride};
-    if (visit) visit(read, slab.size());
+    if (visit)
+      VOX_CHECK(parallel_for(ctx, slab.size().z, [&](int64_t i) -> Status {
+        visit({read.row(0, i), read.row_stride, read.slice_stride}, {slab.size().x, slab.size().y, 1});
+        return {};
+      }));
     VOX_CHECK(
         is_color(info.format) ? halve_colors(read, slab.size(), static_cast<size_t>(bytes), out->data(), ctx)
         : info.format == VoxelFormat::float32 ? halve_slab<float>(read, slab.size(), info, out->data(), ctx)

@@ -17,7 +17,8 @@ inline bool has_no_means(const VolumeInfo& info) {
 /// several such the least.
 /// Of colours the mean of solid ones, weighted by their alpha, with the mean alpha of all; where that would
 /// be void, and not all are, the least that is not. Where all are the fill value, or no numbers, so is the
-/// mean. `visit`, if given, sees every slab of the source, packed, in order. Memory: a slab of at least two
+/// mean. `visit`, if given, sees every slice of the source once, in any order, on several
+/// threads. Memory: a slab of at least two
 /// slices. Errors: those of the source; ErrorCode::output.
 Result<std::unique_ptr<VolumeSource>> halved(VolumeSource& source,
                                              const std::function<void(ConstVoxelSpan, Index3)>& visit,

@@ -45,7 +45,7 @@ struct PackedOptions {
   /// With it `max_error` is 0, and is found: for floats any number, for integers a whole one. Where no whole
   /// bound leads near enough, the largest one with at least the decibels, which may be 0; or the smallest one
   /// with no more than the bits, or, if all have more, the one with the fewest. Samples of the pages tell
-  /// which; then the whole volume is encoded, and, where that is off, once more, or twice.
+  /// which; then the whole volume is encoded, and, where that is off, up to three times more.
   std::optional<PackedTarget> target = std::nullopt;
   bool levels = true;  ///< whether there are levels above 0
   int page_side = 16;  ///< 16 or 8 voxels

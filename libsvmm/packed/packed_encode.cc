@@ -39,8 +39,8 @@ constexpr uint64_t fewest_fitted = 16, most_fitted = 64, share_fitted = 8;
 constexpr int sampling_rounds = 2;
 /// So few are decoded at once where it matters which values they have.
 constexpr uint64_t most_pages_without_ranges = 8;
-/// Of a target: small volumes may need the third.
-constexpr int most_attempts = 3;
+/// Of a target: two are the rule.
+constexpr int most_attempts = 4;
 
 class Encoder {
  public:
@@ -95,10 +95,12 @@ class Encoder {
       std::unique_ptr<TemporaryFile> file = std::make_unique<TemporaryFile>("the compressed volume");
     };
     std::optional<Attempt> kept;
+    std::vector<double> bounds;
     for (int i = 0; i < most_attempts; ++i) {
       Attempt next;
       next.bound = search.best();
-      if (kept && kept->bound == next.bound) break;
+      if (std::ranges::find(bounds, next.bound) != bounds.end()) break;
+      bounds.push_back(next.bound);
       VOX_TRY(const Written written, write(next.bound, [&](auto bytes) { return next.file->write(bytes); }));
       next.measured = measure(written);
       next.params = params_;

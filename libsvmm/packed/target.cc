@@ -10,7 +10,13 @@ constexpr size_t most_tries = 4;
 constexpr double psnr_tolerance = 0.2;   // dB
 constexpr double bits_tolerance = 0.02;  // of the bits
 /// Where a bound is far from any that is known.
-constexpr double most_doublings = 8;
+constexpr double most_doublings = 3;
+
+/// Bits are as many as the bound has doublings less where they are many, and fall by a factor with each where
+/// they are few: this changes by about as much everywhere.
+double evened(double bits) {
+  return bits > 64 ? bits : std::log2(std::exp2(bits) - 1);
+}
 
 }  // namespace
 
@@ -19,11 +25,17 @@ BoundSearch::BoundSearch(const PackedTarget& target, bool whole, double least, d
       whole_(whole),
       least_(least),
       most_(std::max(most, least)),
-      tolerance_(target.kind == PackedTarget::Kind::psnr ? psnr_tolerance : bits_tolerance * target.value),
+      tolerance_(target.kind == PackedTarget::Kind::psnr
+                     ? psnr_tolerance
+                     : evened((1 + bits_tolerance) * target.value) - evened(target.value)),
       steepest_(target.kind == PackedTarget::Kind::psnr ? -20 * std::log10(2.0) : -1) {}
 
 double BoundSearch::at(double bound) const {
   return std::log2(whole_ ? 2 * bound + 1 : bound);
+}
+double BoundSearch::excess_of(double measured) const {
+  return target_.kind == PackedTarget::Kind::psnr ? measured - target_.value
+                                                  : evened(measured) - evened(target_.value);
 }
 double BoundSearch::bound_at(double at) const {
   return whole_ ? (std::exp2(at) - 1) / 2 : std::exp2(at);
@@ -38,7 +50,7 @@ std::vector<BoundSearch::Try> BoundSearch::finite() const {
 
 /// Samples are few: what they say of a slope is believed as far as it may be.
 double BoundSearch::slope(const Try& a, const Try& b) const {
-  return std::clamp((b.excess - a.excess) / (b.at - a.at), 2 * steepest_, steepest_ / 16);
+  return std::clamp((b.excess - a.excess) / (b.at - a.at), 2 * steepest_, steepest_ / 4);
 }
 
 double BoundSearch::excess_at(double at) const {
@@ -54,13 +66,18 @@ double BoundSearch::excess_at(double at) const {
 double BoundSearch::zero() const {
   const auto known = finite();
   if (known.size() == 1) return known[0].at - known[0].excess / steepest_;
+  // Two whole volumes tell more than all samples; of what lies far from them, not much.
+  auto tries = known;
+  std::erase_if(tries, [](const Try& t) { return !t.whole; });
+  const bool whole = tries.size() > 1;
+  if (!whole) tries = known;
   size_t i = 0;
-  while (i + 2 < known.size() && known[i + 1].excess > 0) ++i;
-  const Try &a = known[i], &b = known[i + 1];
+  while (i + 2 < tries.size() && tries[i + 1].excess > 0) ++i;
+  const Try &a = tries[i], &b = tries[i + 1];
   if (a.excess > 0 && b.excess < 0) return a.at + (b.at - a.at) * a.excess / (a.excess - b.excess);
   const Try& from = std::abs(a.excess) < std::abs(b.excess) ? a : b;
-  const double steps = -from.excess / slope(a, b);
-  return from.at + std::clamp(steps, -most_doublings, most_doublings);
+  const double steps = -from.excess / slope(a, b), most = whole ? 1 : most_doublings;
+  return from.at + std::clamp(steps, -most, most);
 }
 
 std::optional<double> BoundSearch::next(double guess) const {
@@ -89,18 +106,23 @@ std::optional<double> BoundSearch::next(double guess) const {
   return tried ? std::nullopt : std::optional(bound);
 }
 
-void BoundSearch::add(double bound, double measured) {
+void BoundSearch::put(double bound, double measured, bool whole) {
   std::erase_if(tries_, [&](const Try& t) { return t.bound == bound; });
-  tries_.push_back({bound, at(bound), measured - target_.value});
+  tries_.push_back({bound, at(bound), excess_of(measured), whole});
   std::ranges::sort(tries_, {}, &Try::bound);
+}
+void BoundSearch::add(double bound, double measured) {
+  put(bound, measured, false);
 }
 
 void BoundSearch::correct(double bound, double measured) {
+  std::erase_if(tries_, [&](const Try& t) { return t.bound == bound && t.whole; });
   if (!finite().empty() && std::isfinite(measured) && std::isfinite(at(bound))) {
-    const double off = measured - target_.value - excess_at(at(bound));
-    for (Try& t : tries_) t.excess += off;
+    const double off = excess_of(measured) - excess_at(at(bound));
+    for (Try& t : tries_)
+      if (!t.whole) t.excess += off;
   }
-  add(bound, measured);
+  put(bound, measured, true);
 }
 
 double BoundSearch::best() const {
@@ -117,13 +139,13 @@ double BoundSearch::best() const {
 }
 
 bool BoundSearch::near(double measured) const {
-  return std::abs(measured - target_.value) <= tolerance_;
+  return std::abs(excess_of(measured)) <= tolerance_;
 }
 
 bool BoundSearch::better(double measured, double than) const {
   const auto kept = [&](double value) {
     return target_.kind == PackedTarget::Kind::psnr ? value >= target_.value - tolerance_
-                                                    : value <= target_.value + tolerance_;
+                                                    : value <= target_.value * (1 + bits_tolerance);
   };
   if (kept(measured) != kept(than)) return kept(measured);
   return std::abs(measured - target_.value) < std::abs(than - target_.value);

@@ -34,9 +34,12 @@ class BoundSearch {
  private:
   struct Try {
     double bound, at;  ///< `at`: its logarithm
-    double excess;     ///< above 0: the bound may be larger
+    double excess;     ///< decibels, or bits on an evened scale; above 0: the bound may be larger
+    bool whole;        ///< of the whole volume, not of samples
   };
   double at(double bound) const;
+  double excess_of(double measured) const;
+  void put(double bound, double measured, bool whole);
   double bound_at(double at) const;
   /// What is to be expected; finite.
   double excess_at(double at) const;

@@ -49,6 +49,7 @@ KINDS = {
     "svmm bounded": (["svmm-encode", "membrane:40,30,20:1", "--layout", "packed", "--max-error", "3", "--page", "8"],
                      "a.svmm", PACKED + [DVR]),
     "svmm colors": (["svmm-encode", "menger:3", "--layout", "packed", "-q", "100"], "a.svmm", PACKED),
+    "svmm indexed": (["svmm-encode", "@few.nrrd", "-q", "100"], "a.svmm", PACKED),
     "vqv": (["vq-encode", "membrane:40,30,20:1"], "a.vqv", PACKED + [DVR]),
     "vqv means": (["vq-encode", "membrane:40,30,20:1", "-k", "40"], "a.vqv", PACKED + [DVR]),
     "vqv zstd": (["vq-encode", "membrane:40,30,20:1", "--zstd", "3"], "a.vqv", PACKED + [DVR]),
@@ -67,6 +68,14 @@ KINDS = {
     "ply": (["vox-decode", "@menger.dagc"], "a.ply", SURFACE),
     "dicom": (None, "a.dcm", VOLUME),
 }
+
+
+def few_colors():
+    """Blocks of three colours and void as an NRRD file."""
+    colors = (b"\0\0\0", b"\xff\x20\x10", b"\x08\xc0\x08", b"\x30\x30\xe0")
+    voxels = b"".join(colors[(x // 3 + y // 2 + z // 4) % 4] for z in range(24) for y in range(30) for x in range(40))
+    return b"NRRD0005\ntype: uint8\ndimension: 4\nsizes: 3 40 30 24\nkinds: RGB-color domain domain domain\n" \
+        b"encoding: raw\n\n" + voxels
 
 
 def dicom():
@@ -193,6 +202,7 @@ def main():
     with tempfile.TemporaryDirectory() as name:
         folder = pathlib.Path(name)
         subprocess.run([options.bin / "dagcolor-pack", "menger:2", "-o", folder / "menger.dagc", "-q"], check=True)
+        (folder / "few.nrrd").write_bytes(few_colors())
         for kind, (make, file, programs) in KINDS.items():
             if options.kind not in (None, kind):
                 continue
