@@ -1,8 +1,11 @@
 #include "formats/fill.h"
 
+#include <fmt/format.h>
+
 #include <bit>
 #include <cmath>
 #include <cstring>
+#include <functional>
 #include <limits>
 #include <mutex>
 
@@ -16,8 +19,10 @@ constexpr double far_away = 1000;  // extents of all other values
 /// A FLOAT32 source in which voxels of one kind become another value.
 class ReplacingSource final : public VolumeSource {
  public:
-  ReplacingSource(std::unique_ptr<VolumeSource> source, float from, float to, double fill)
-      : source_(std::move(source)), from_(from), to_(to) {
+  /// `lost_nan` is called once, when NaN are first met that are no more than `from` then.
+  ReplacingSource(std::unique_ptr<VolumeSource> source, float from, float to, double fill,
+                  std::function<void()> lost_nan = {})
+      : source_(std::move(source)), from_(from), to_(to), lost_nan_(std::move(lost_nan)) {
     info_ = source_->info();
     info_.fill = fill;
   }
@@ -47,10 +52,13 @@ class ReplacingSource final : public VolumeSource {
  private:
   /// NaN stands for any NaN.
   float replaced(float value) const {
+    if (lost_nan_ && std::isnan(value)) std::call_once(said_, lost_nan_);
     return value == from_ || (std::isnan(value) && (std::isnan(from_) || std::isnan(to_))) ? to_ : value;
   }
   std::unique_ptr<VolumeSource> source_;
   float from_, to_;
+  std::function<void()> lost_nan_;
+  mutable std::once_flag said_;
 };
 
 /// Of an integer volume, whose voxels stay.
@@ -99,11 +107,19 @@ struct Ends {
 
 }  // namespace
 
-std::unique_ptr<VolumeSource> with_fill(std::unique_ptr<VolumeSource> source, double fill) {
+std::unique_ptr<VolumeSource> with_fill(std::unique_ptr<VolumeSource> source, double fill,
+                                        const std::function<void(const std::string&)>& note) {
   if (is_color(source->info().format)) return source;
   constexpr float nan = std::numeric_limits<float>::quiet_NaN();
-  if (source->info().format == VoxelFormat::float32)
-    return std::make_unique<ReplacingSource>(std::move(source), static_cast<float>(fill), nan, fill);
+  if (source->info().format == VoxelFormat::float32) {
+    std::function<void()> lost_nan;
+    if (note && !std::isnan(fill))
+      lost_nan = [note, fill] {
+        note(fmt::format("voxels that are no number become the fill value, {:.9g}", fill));
+      };
+    return std::make_unique<ReplacingSource>(std::move(source), static_cast<float>(fill), nan, fill,
+                                             std::move(lost_nan));
+  }
   return std::make_unique<NamedFillSource>(std::move(source), fill);
 }
 

@@ -4,8 +4,10 @@
 // average or quantiser counts; files of other formats get the value itself back.
 #pragma once
 
+#include <functional>
 #include <memory>
 #include <optional>
+#include <string>
 
 #include "formats/context.h"
 #include "formats/source.h"
@@ -14,8 +16,9 @@ namespace voxkit {
 
 /// FLOAT32: voxels of the value `fill`, and NaN, become NaN, and info().fill is the value. Of integers only
 /// the latter; they keep it as a voxel. Of colours nothing. `fill` NaN: there is no other value than NaN for
-/// it.
-std::unique_ptr<VolumeSource> with_fill(std::unique_ptr<VolumeSource> source, double fill);
+/// it. `note`, if given, hears that there are NaN, which a reader will find as the value.
+std::unique_ptr<VolumeSource> with_fill(std::unique_ptr<VolumeSource> source, double fill,
+                                        const std::function<void(const std::string&)>& note = {});
 
 /// The other way, for writers: NaN of a FLOAT32 volume with a fill value becomes that value.
 std::unique_ptr<VolumeSource> fill_restored(std::unique_ptr<VolumeSource> source);

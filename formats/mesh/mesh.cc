@@ -131,9 +131,9 @@ Status load_pictures(MeshParts& parts, const std::string& path, MeshFolder& fold
           const std::string file,
           folder.find(reference.name, fmt::format("material {}: its texture", material), reference.library));
       if (file.empty())
-        return bad_input(
-            path, fmt::format("material {}: its texture {} is missing: expected it beside the mesh", material,
-                              reference.name));
+        return bad_input(path, fmt::format("material {}: its texture {} is missing: expected it beside the "
+                                           "mesh, or the file that names it",
+                                           material, reference.name));
       picture = read_picture(file, ctx);
     }
     if (picture && (reference.base != 0 || reference.gain != 1))

@@ -40,8 +40,8 @@ Result<std::vector<TransferPoint>> read_transfer_file(const std::string& path) {
     if (!item.is_object() || item.size() != 2 || !item.contains("value") || !item.contains("rgba"))
       return wrong("expected {\"value\": v, \"rgba\": [r, g, b, a]}");
     const Json &value = item["value"], &rgba = item["rgba"];
-    if (!value.is_number() || !(std::abs(value.get<double>()) < 1e30))
-      return wrong("\"value\": expected a number");
+    if (!value.is_number() || !(std::abs(value.get<double>()) <= 0x1.fffffep127))
+      return wrong("\"value\": expected a number, within 3.4e38 of 0");
     if (!rgba.is_array() || rgba.size() != 4) return wrong("\"rgba\": expected 4 numbers from 0 to 1");
     TransferPoint point{value.get<double>(), {}};
     for (size_t k = 0; k < 4; ++k) {

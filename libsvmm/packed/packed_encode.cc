@@ -110,8 +110,10 @@ class Encoder {
       if (done) break;
     }
     params_ = kept->params;
-    ctx_.note(fmt::format("greatest error {:.6g}: {:.6g} {}", params_.max_error, kept->measured,
-                          psnr ? "dB" : "bits a voxel"));
+    ctx_.note(fmt::format(
+        "greatest error {:.6g}: {:.6g} {}{}", params_.max_error, kept->measured, psnr ? "dB" : "bits a voxel",
+        search.near(kept->measured) ? std::string()
+                                    : fmt::format(", where {:.6g} was asked for", target.value)));
     VOX_TRY(const auto file, kept->file->map());
     VOX_CHECK(sink(file->bytes()));
     return params_;

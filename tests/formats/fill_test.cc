@@ -34,13 +34,19 @@ class FillTest : public testing::Test {
 };
 
 TEST_F(FillTest, IsNoNumberInsideAndItselfOutside) {
-  auto inside = with_fill(source({1, -9999, 2, NAN}), -9999);
+  std::vector<std::string> notes;
+  const auto note = [&](const std::string& text) { notes.push_back(text); };
+  auto inside = with_fill(source({1, -9999, 2, NAN}), -9999, note);
   EXPECT_EQ(inside->info().fill, -9999);
   const auto values = read(*inside);
   EXPECT_EQ(values[0], 1);
   EXPECT_TRUE(std::isnan(values[1]));
   EXPECT_TRUE(std::isnan(values[3]));
   EXPECT_EQ(*measure_range(*inside, ctx_), (ValueRange{1, 2}));
+  EXPECT_EQ(notes, std::vector<std::string>{"voxels that are no number become the fill value, -9999"});
+  read(*with_fill(source({1, -9999, 2, 3}), -9999, note));
+  read(*with_fill(source({1, NAN, 2, 3}), NAN, note));
+  EXPECT_EQ(notes.size(), 1u);
   const auto outside = fill_restored(std::move(inside));
   EXPECT_EQ(read(*outside), (std::vector<float>{1, -9999, 2, -9999}));
 }

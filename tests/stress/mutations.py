@@ -171,9 +171,12 @@ def run(command, folder):
 
 
 def judge(command, code, err, peak, folder):
+    """Returns the exit code that the run counts as."""
     tool = command[0].rsplit("/", 1)[1]
     own = tuple(f"{name}: " for name in (tool, *(command[1:] if code == 0 else ())))  # or of what was done, of a file
     wrong = [line for line in err.splitlines() if not line.startswith(own)]
+    if code == 2 and "--roi: the box is not inside" in err:
+        code = 3  # of extents that were changed
     if code not in (0, 1, 3, 5):
         raise Found(f"exit {code}: {err}")
     if wrong:
@@ -186,6 +189,7 @@ def judge(command, code, err, peak, folder):
         left = [path.name for path in folder.iterdir() if path.name.startswith(("out", ".out"))]
         if left:
             raise Found(f"exit {code} and {left} is there")
+    return code
 
 
 def main():
@@ -227,8 +231,7 @@ def main():
                     code, err, peak, seconds = run(command, folder)
                     runs += 1
                     try:
-                        judge(command, code, err, peak, folder)
-                        counts[code] += 1
+                        counts[judge(command, code, err, peak, folder)] += 1
                     except Found as found:
                         broken += 1
                         kept = pathlib.Path(tempfile.gettempdir()) / f"mutation-{options.seed}-{kind}-{i}-{file}"

@@ -39,6 +39,13 @@ Result<Census> look_at_floats(std::unique_ptr<VolumeSource>& source, Inputs& inp
     VOX_TRY(source, inputs.open(true));
   }
   if (has_fill || !census.outlier) return census;
+  if (census.has_nan) {
+    run.say(fmt::format(
+        "{}: the value {:.9g} lies more than 1000 times the range of all others away; as there are "
+        "voxels that are no number, too, it is not taken as a fill value (--fill V is)",
+        input, *census.outlier));
+    return census;
+  }
   run.say(fmt::format(
       "{}: the value {:.9g} lies more than 1000 times the range of all others away: it is taken as a fill "
       "value (--fill V names another)",

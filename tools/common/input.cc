@@ -207,7 +207,7 @@ Result<Input> open_input(const std::string& name, const OpenOptions& options, Co
                          *options.fill));
     fill = std::nullopt;
   }
-  if (fill) input.source = with_fill(std::move(input.source), *fill);
+  if (fill) input.source = with_fill(std::move(input.source), *fill, ctx.note);
   return input;
 }
 
