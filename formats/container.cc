@@ -116,6 +116,19 @@ bool is_container(std::span<const std::byte> bytes) {
          std::memcmp(bytes.data(), container_magic.data(), container_magic.size()) == 0;
 }
 
+/// The length of the longest beginning that ends with a trailer of its own: behind a checkpoint, or before
+/// what was appended. 0: there is none.
+static uint64_t whole_prefix(std::span<const std::byte> bytes) {
+  for (uint64_t at = bytes.size() / block_size * block_size; at >= 2 * block_size; at -= block_size) {
+    const std::byte* const trailer = bytes.data() + at - block_size;
+    if (std::memcmp(trailer, trailer_magic.data(), trailer_magic.size()) == 0 &&
+        load_le<uint64_t>(trailer + 56) == checksum(std::span(trailer, 56)) &&
+        load_le<uint64_t>(trailer + 24) == at)
+      return at;
+  }
+  return 0;
+}
+
 Result<std::shared_ptr<const Container>> Container::open(std::span<const std::byte> bytes, std::string name,
                                                          std::shared_ptr<const void> keep_alive,
                                                          MemoryBudget* memory) {
@@ -138,9 +151,12 @@ Result<std::shared_ptr<const Container>> Container::open(std::span<const std::by
 
   const uint64_t trailer_offset = bytes.size() - block_size;
   const std::byte* trailer = bytes.data() + trailer_offset;
-  if (std::memcmp(trailer, trailer_magic.data(), trailer_magic.size()) != 0)
-    return bad(fmt::format("trailer, byte {}: missing: the file is cut short or has bytes appended",
-                           trailer_offset));
+  if (std::memcmp(trailer, trailer_magic.data(), trailer_magic.size()) != 0) {
+    const uint64_t whole = whole_prefix(bytes);
+    return bad(fmt::format("trailer, byte {}: missing: the file is cut short or has bytes appended{}",
+                           trailer_offset,
+                           whole > 0 ? fmt::format("; its first {} bytes are a whole file", whole) : ""));
+  }
   if (load_le<uint64_t>(trailer + 56) != checksum(std::span(trailer, 56)))
     return bad(
         fmt::format("trailer, byte {}: the checksum of the trailer does not match", trailer_offset + 56));
