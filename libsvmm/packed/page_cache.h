@@ -3,18 +3,16 @@
 
 #include <array>
 #include <cstddef>
-#include <list>
 #include <memory>
 #include <mutex>
-#include <unordered_map>
 #include <vector>
 
 #include "formats/context.h"
 
 namespace voxkit::svmm {
 
-/// Keeps decoded pages within a share of a memory limit. The oldest goes first, unless it was used since it
-/// came or was last spared, which costs a use nothing. Thread-safe.
+/// Keeps decoded pages within a share of a memory limit. Pages take turns to go, and one that was used since
+/// its last turn is spared (second chance), which costs a use nothing. Thread-safe.
 class PageCache {
  public:
   using Page = std::vector<std::byte>;
@@ -33,27 +31,33 @@ class PageCache {
   void keep(const Key& key, std::shared_ptr<const Page> page);
 
  private:
-  struct Hash {
-    size_t operator()(const Key& key) const {
-      return static_cast<size_t>((key.number * 0x9E3779B97F4A7C15u) ^ static_cast<uint64_t>(key.level) << 57);
-    }
-  };
-  struct Entry {
+  /// With nothing to follow on the way to a page.
+  struct Slot {
     Key key;
-    std::shared_ptr<const Page> page;
-    bool used;
+    std::shared_ptr<const Page> page;  ///< null: the slot is free
+    bool used = false;
   };
-  /// Threads that ask for different pages seldom wait for each other.
+  /// Threads that ask for different pages seldom wait for each other. A table with linear probing, of which
+  /// at least half is free.
   struct Shard {
     std::mutex mutex;
-    std::list<Entry> entries;  ///< the youngest first
-    std::unordered_map<Key, std::list<Entry>::iterator, Hash> places;
+    std::vector<Slot> slots;
+    size_t count = 0, turn = 0;
     uint64_t bytes = 0;
+
+    /// The slot that has the key, or the free one where it would be.
+    size_t place_of(const Key& key) const;
+    void grow();
+    /// Frees a slot, and moves those behind it that it kept from their places.
+    void free(size_t at);
   };
   static constexpr size_t shard_count = 16;
-  Shard& shard_of(const Key& key) { return shards_[Hash()(key) >> 40 & (shard_count - 1)]; }
-  /// The oldest that was not used.
-  void drop_last(Shard& shard);
+  static uint64_t hash(const Key& key) {
+    return (key.number ^ static_cast<uint64_t>(key.level) << 57) * 0x9E3779B97F4A7C15u;
+  }
+  Shard& shard_of(const Key& key) { return shards_[hash(key) >> 60]; }
+  /// Of a shard that has some.
+  void drop_one(Shard& shard);
 
   MemoryBudget& memory_;
   uint64_t shard_limit_;
