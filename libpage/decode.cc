@@ -10,12 +10,12 @@ namespace {
 
 /// Decodes the pages of some lanes, all of one extent, row by row. What they become does not depend on the
 /// type of samples, so that there are few of these, which are much to compile.
-template <class Width, int lane_count, bool masked>
+template <class Width, int lane_count, bool masked, bool avx2>
 [[gnu::always_inline]] inline void decode_rows_body(const ModelData& model, Extent extent,
                                                     std::array<Lane<Width>, lane_count>& lanes,
                                                     std::array<typename Width::Stored*, lane_count> out) {
   using Stored = typename Width::Stored;
-  decode_lanes<Width, lane_count, masked>(
+  decode_lanes<Width, lane_count, masked, avx2>(
       model, extent, lanes, [&](size_t n, const Stored* row) __attribute__((always_inline)) {
         std::copy(row, row + extent.nx, out[n]);
         out[n] += extent.nx;
@@ -25,14 +25,14 @@ template <class Width, int lane_count, bool masked>
 template <class Width, int lane_count, bool masked>
 void decode_rows_anywhere(const ModelData& model, Extent extent, std::array<Lane<Width>, lane_count>& lanes,
                           const std::array<typename Width::Stored*, lane_count>& out) {
-  decode_rows_body<Width, lane_count, masked>(model, extent, lanes, out);
+  decode_rows_body<Width, lane_count, masked, false>(model, extent, lanes, out);
 }
 #ifdef VOXKIT_AVX2
 template <class Width, int lane_count, bool masked>
 VOXKIT_AVX2_CODE void decode_rows_avx2(const ModelData& model, Extent extent,
                                        std::array<Lane<Width>, lane_count>& lanes,
                                        const std::array<typename Width::Stored*, lane_count>& out) {
-  decode_rows_body<Width, lane_count, masked>(model, extent, lanes, out);
+  decode_rows_body<Width, lane_count, masked, true>(model, extent, lanes, out);
 }
 #endif
 

@@ -41,9 +41,9 @@ template <class Width>
   }
 }
 
-/// Pages have void voxels if `masked`. Calls `row_out(lane number, samples of the row)` for each row of each
-/// lane in order.
-template <class Width, int lane_count, bool masked, class RowOut>
+/// Pages have void voxels if `masked`; `avx2`: in code for that. Calls `row_out(lane number, samples of the
+/// row)` for each row of each lane in order.
+template <class Width, int lane_count, bool masked, bool avx2, class RowOut>
 [[gnu::always_inline]] inline void decode_lanes(const ModelData& model, Extent extent,
                                                 std::array<Lane<Width>, lane_count>& lanes,
                                                 const RowOut& row_out) {
@@ -69,7 +69,7 @@ template <class Width, int lane_count, bool masked, class RowOut>
   for (int z = 0; z < extent.nz; ++z)
     for (int y = 0; y < extent.ny; ++y) {
       each([&](auto n) __attribute__((always_inline)) {
-        plan_row<Width>(model, extent, y, z, lanes[n].memory, lanes[n].plan);
+        plan_row<Width, avx2>(model, extent, y, z, lanes[n].memory, lanes[n].plan);
         row[n] = row_of(lanes[n].memory.samples, y, z);
         magnitudes[n] = row_of(lanes[n].memory.magnitudes, y, z);
         left[n] = {};

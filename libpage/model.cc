@@ -65,12 +65,25 @@ void ModelData::derive() {
 
 void ModelData::set_weights(const std::array<Weights, most_classes>& fitted) {
   weights = fitted;
-  if (!classes.parents) return;
+  if (!classes.parents) {
+    for (size_t row = 0; row < 6; ++row)
+      for (size_t i = 0; i < pairs[row].size() && 2 * i < static_cast<size_t>(row_taps(false)); ++i) {
+        const Weights& w = weights[3 * row + inner];
+        std::array<int16_t, max_side> first, second;
+        first.fill(w[row_tap(2 * i)]);
+        second.fill(w[row_tap(2 * i + 1)]);
+        pairs[row][i] = paired(first, second);
+      }
+    return;
+  }
   for (size_t row = 0; row < rows.size(); ++row)
     for (size_t t = 0; t < tap_count; ++t)
       for (size_t x = 0; x < max_side; ++x)
         rows[row][t][x] =
             weights[4 * row + static_cast<size_t>(classes.along(static_cast<int>(x), max_side))][t];
+  for (size_t row = 0; row < rows.size(); ++row)
+    for (size_t i = 0; i < pairs[row].size(); ++i)
+      pairs[row][i] = paired(rows[row][row_tap(2 * i)], rows[row][row_tap(2 * i + 1)]);
 }
 
 void ModelData::set_palette(std::vector<uint32_t> ascending) {

@@ -13,6 +13,7 @@
 #include "libpage/predictor.h"
 #include "libpage/symbols.h"
 #include "libpage/tables.h"
+#include "libpage/tap_sums.h"
 
 namespace voxkit::page {
 
@@ -44,6 +45,9 @@ struct ModelData {
   std::vector<uint16_t> numbers;
   /// With parents: weights of rows by class along y and z, of 16 voxels.
   std::array<RowWeights, most_classes / 4> rows{};
+  /// Of narrow models: those of the taps in earlier rows and of parents two by two, for the same rows;
+  /// without parents of voxels that are neither first nor last.
+  std::array<std::array<WeightPairs, row_taps(true) / 2>, most_classes / 4> pairs{};
 
   int contexts() const { return context_count(classes.parents); }
   /// Of parents, where there is a palette: the number of the entry next to a sample, the lower one of two.

@@ -24,6 +24,14 @@ inline constexpr int tap_count = 30;
 inline constexpr int taps_of(bool parents) {
   return parents ? tap_count : causal_taps;
 }
+/// Taps that are known before the first voxel of a row: all but the two before a voxel.
+inline constexpr int row_taps(bool parents) {
+  return taps_of(parents) - 2;
+}
+/// Of these, the number of tap i.
+inline constexpr size_t row_tap(size_t i) {
+  return i < static_cast<size_t>(left_tap) ? i : i + 2;
+}
 inline constexpr int weight_bits = 12;
 /// The sum of the weights of a class, so that what is uniform is predicted as it is.
 inline constexpr int32_t weight_one = 1 << weight_bits;

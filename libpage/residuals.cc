@@ -132,7 +132,7 @@ template <class Width>
   return count;
 }
 
-template <class Width>
+template <class Width, bool avx2>
 [[gnu::always_inline]] inline void find_rows(const ModelData& model, const uint32_t* samples, Extent extent,
                                              const Mask* mask, Memory<Width>& memory, Residuals& out,
                                              uint32_t* decoded) {
@@ -143,7 +143,7 @@ template <class Width>
   size_t coded = 0;
   for (int z = 0; z < extent.nz; ++z)
     for (int y = 0; y < extent.ny; ++y, samples += nx) {
-      plan_row<Width>(model, extent, y, z, memory, plan);
+      plan_row<Width, avx2>(model, extent, y, z, memory, plan);
       Stored* row = row_of(memory.samples, y, z);
       uint16_t* magnitudes = row_of(memory.magnitudes, y, z);
       const uint32_t solid = mask ? mask->row(y, z) & whole : whole;
@@ -171,14 +171,14 @@ template <class Width>
 template <class Width>
 void find_rows_anywhere(const ModelData& model, const uint32_t* samples, Extent extent, const Mask* mask,
                         Memory<Width>& memory, Residuals& out, uint32_t* decoded) {
-  find_rows(model, samples, extent, mask, memory, out, decoded);
+  find_rows<Width, false>(model, samples, extent, mask, memory, out, decoded);
 }
 #ifdef VOXKIT_AVX2
 template <class Width>
 VOXKIT_AVX2_CODE void find_rows_avx2(const ModelData& model, const uint32_t* samples, Extent extent,
                                      const Mask* mask, Memory<Width>& memory, Residuals& out,
                                      uint32_t* decoded) {
-  find_rows(model, samples, extent, mask, memory, out, decoded);
+  find_rows<Width, true>(model, samples, extent, mask, memory, out, decoded);
 }
 #endif
 

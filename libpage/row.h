@@ -123,7 +123,7 @@ template <class Width>
       std::min<uint32_t>(plan.activity[0] + left_share * above[0], uint32_t{most_row_activity}));
 }
 
-template <class Width>
+template <class Width, bool avx2>
 [[gnu::always_inline]] inline void plan_alone(const ModelData& model, Extent extent, int y, int z,
                                               const Memory<Width>& memory, RowPlan<Width>& plan) {
   using Sum = typename Width::Sum;
@@ -133,7 +133,16 @@ template <class Width>
     return model.weights[static_cast<size_t>(model.classes.of(px, py, z))];
   };
   const Weights& weights = weights_of(inner);
-  for (int x = 0; x < max_side; ++x) plan.base[static_cast<size_t>(x)] = base_at<Width>(weights, rows, x);
+#ifdef VOXKIT_AVX2
+  if constexpr (avx2 && std::is_same_v<Width, Narrow>) {
+    const std::array<const int16_t*, row_taps(false)> taps = {
+        rows[0] - 1, rows[0],     rows[0] + 1, rows[1] - 1, rows[1],     rows[1] + 1, rows[2] - 1,
+        rows[2],     rows[2] + 1, rows[3] - 1, rows[3],     rows[3] + 1, rows[4],     rows[5]};
+    const auto row_class = static_cast<size_t>(model.classes.of(0, py, z)) / 3;
+    sum_taps_avx2(taps, model.pairs[row_class].data(), rounding, plan.base.data());
+  } else
+#endif
+    for (int x = 0; x < max_side; ++x) plan.base[static_cast<size_t>(x)] = base_at<Width>(weights, rows, x);
   plan.left_weight.fill(weights[left_tap]);
   plan.second_left_weight.fill(weights[second_left_tap]);
   const auto at_side = [&](int x, int px) {
@@ -162,7 +171,7 @@ template <class Width>
   find_activity(y, z, memory, share, plan);
 }
 
-template <class Width>
+template <class Width, bool avx2>
 [[gnu::always_inline]] inline void plan_with_parents(const ModelData& model, Extent extent, int y, int z,
                                                      const Memory<Width>& memory, RowPlan<Width>& plan) {
   using Sum = typename Width::Sum;
@@ -172,19 +181,25 @@ template <class Width>
   const auto row_class = static_cast<size_t>(model.classes.of(0, model.classes.along(y, extent.ny), z)) / 4;
   const RowWeights& weights = model.rows[row_class];
   // Each tap's row, from where its weight for voxel 0 applies.
-  const std::array<const Stored*, tap_count - 2> taps = {
+  const std::array<const Stored*, row_taps(true)> taps = {
       rows[0] - 1, rows[0],        rows[0] + 1,    rows[1] - 1, rows[1],        rows[1] + 1,
       rows[2] - 1, rows[2],        rows[2] + 1,    rows[3] - 1, rows[3],        rows[3] + 1,
       rows[4],     rows[5],        parents[0] - 2, parents[0],  parents[0] + 2, parents[1] - 2,
       parents[1],  parents[1] + 2, parents[2] - 2, parents[2],  parents[2] + 2, parents[3] - 2,
       parents[3],  parents[3] + 2, parents[4],     parents[5]};
-  const auto number = [](size_t i) { return i < left_tap ? i : i + 2; };
-  for (size_t x = 0; x < max_side; ++x) {
-    Sum sum = rounding;
+#ifdef VOXKIT_AVX2
+  if constexpr (avx2 && std::is_same_v<Width, Narrow>) {
+    sum_taps_avx2(taps, model.pairs[row_class].data(), rounding, plan.base.data());
+  } else
+#endif
+    for (size_t x = 0; x < max_side; ++x) {
+      Sum sum = rounding;
 #pragma GCC unroll 32
-    for (size_t i = 0; i < taps.size(); ++i)
-      sum += static_cast<Sum>(weights[number(i)][x]) * static_cast<Sum>(taps[i][x]);
-    plan.base[x] = sum;
+      for (size_t i = 0; i < taps.size(); ++i)
+        sum += static_cast<Sum>(weights[row_tap(i)][x]) * static_cast<Sum>(taps[i][x]);
+      plan.base[x] = sum;
+    }
+  for (size_t x = 0; x < max_side; ++x) {
     plan.left_weight[x] = weights[left_tap][x];
     plan.second_left_weight[x] = weights[second_left_tap][x];
   }
@@ -193,7 +208,7 @@ template <class Width>
     const Weights& w = model.weights[4 * row_class + 3];
     Sum sum = rounding;
     for (size_t i = 0; i < taps.size(); ++i)
-      sum += static_cast<Sum>(w[number(i)]) * static_cast<Sum>(taps[i][x]);
+      sum += static_cast<Sum>(w[row_tap(i)]) * static_cast<Sum>(taps[i][x]);
     plan.base[x] = sum;
     plan.left_weight[x] = w[left_tap];
     plan.second_left_weight[x] = w[second_left_tap];
@@ -225,13 +240,14 @@ template <class Width>
   find_activity(y, z, memory, share, plan);
 }
 
-template <class Width>
+/// `avx2`: in code for that.
+template <class Width, bool avx2>
 [[gnu::always_inline]] inline void plan_row(const ModelData& model, Extent extent, int y, int z,
                                             const Memory<Width>& memory, RowPlan<Width>& plan) {
   if (model.classes.parents)
-    plan_with_parents(model, extent, y, z, memory, plan);
+    plan_with_parents<Width, avx2>(model, extent, y, z, memory, plan);
   else
-    plan_alone(model, extent, y, z, memory, plan);
+    plan_alone<Width, avx2>(model, extent, y, z, memory, plan);
 }
 
 /// Copies of the ends of a row beside it.
