@@ -9,8 +9,9 @@
 namespace voxkit::svmm {
 namespace {
 
-constexpr size_t head_bytes = 8, range_bytes = 2;
-constexpr uint8_t none_least = 1, none_greatest = 0;
+constexpr size_t head_bytes = 8;
+constexpr uint32_t steps = 16;  // of all codes
+constexpr uint32_t none_least = 1, none_greatest = 0;
 
 /// The codes that stand for finite numbers.
 CodeRange finite_codes(const ValueMap& map) {
@@ -25,9 +26,9 @@ CodeRange finite_codes(const ValueMap& map) {
   }
 }
 
-/// Ranges are in so many steps from the least code of all.
+/// From the least code of all.
 constexpr uint32_t step_of(const CodeRange& all) {
-  return (all.greatest - all.least) / 256 + 1;
+  return (all.greatest - all.least) / steps + 1;
 }
 
 }  // namespace
@@ -55,15 +56,14 @@ template CodeRange finite_range(std::span<const uint32_t>, const ValueMap&);
 std::vector<std::byte> pack_ranges(std::span<const CodeRange> coded) {
   CodeRange all;
   for (const CodeRange& range : coded) all.add(range);
-  std::vector<std::byte> bytes(head_bytes + range_bytes * coded.size());
+  std::vector<std::byte> bytes(head_bytes + coded.size());
   store_le(bytes.data(), all.least);
   store_le(bytes.data() + 4, all.greatest);
   std::byte* at = bytes.data() + head_bytes;
   for (const CodeRange& range : coded) {
-    const uint32_t step = range.empty() ? 1 : step_of(all);
-    *at++ = std::byte(range.empty() ? none_least : static_cast<uint8_t>((range.least - all.least) / step));
-    *at++ =
-        std::byte(range.empty() ? none_greatest : static_cast<uint8_t>((range.greatest - all.least) / step));
+    const uint32_t step = step_of(all), first = range.empty() ? none_least : (range.least - all.least) / step,
+                   last = range.empty() ? none_greatest : (range.greatest - all.least) / step;
+    *at++ = static_cast<std::byte>(first | last << 4);
   }
   return bytes;
 }
@@ -117,7 +117,7 @@ Result<std::optional<PageRanges>> page_ranges(const PackedVolume& volume) {
   if (chunk == table.end() || volume.finest() != 0 || is_color(format)) return std::nullopt;
   VOX_TRY(const auto bytes, container.chunk(static_cast<size_t>(chunk - table.begin())));
   const auto bad = [&] {
-    return bad_input(container.name(), "chunk RNGE 0.0: expected two bytes for each page that is coded");
+    return bad_input(container.name(), "chunk RNGE 0.0: expected a byte for each page that is coded");
   };
   if (bytes.size() < head_bytes) return bad();
   const CodeRange all{load_le<uint32_t>(bytes.data()), load_le<uint32_t>(bytes.data() + 4)};
@@ -149,10 +149,8 @@ Result<std::optional<PageRanges>> page_ranges(const PackedVolume& volume) {
         whole = merged(whole, ranges.pages.back());
         continue;
       }
-      if (bytes.size() - at < range_bytes) return bad();
-      const auto first = std::to_integer<uint64_t>(bytes[at]),
-                 last = std::to_integer<uint64_t>(bytes[at + 1]);
-      at += range_bytes;
+      if (at == bytes.size()) return bad();
+      const auto range = std::to_integer<uint64_t>(bytes[at++]), first = range & 15, last = range >> 4;
       const uint64_t step = all.empty() ? 1 : step_of(all);
       ranges.pages.push_back(
           first > last || all.empty()

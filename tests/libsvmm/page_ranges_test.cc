@@ -59,10 +59,10 @@ TEST(PageRanges, HoldAndAreNoneTooWide) {
           const auto said = (*ranges)->pages[page];
           EXPECT_LE(static_cast<double>(said.lo), lo);
           EXPECT_GE(static_cast<double>(said.hi), hi);
-          // Of integers, and of floats in steps, they are off by a 256th of all.
+          // Of integers, and of floats in steps, they are off by a 16th of all.
           if (format == VoxelFormat::float32 && bound == 0) continue;
-          EXPECT_GE(static_cast<double>(said.lo), lo - (greatest - least) / 200 - 1);
-          EXPECT_LE(static_cast<double>(said.hi), hi + (greatest - least) / 200 + 1);
+          EXPECT_GE(static_cast<double>(said.lo), lo - (greatest - least) / 15 - 1);
+          EXPECT_LE(static_cast<double>(said.hi), hi + (greatest - least) / 15 + 1);
         }
       }
 }
@@ -82,9 +82,9 @@ TEST(PageRanges, ThatDoNotHoldAreFoundByTheCheck) {
   const size_t at = place_of(good);
   ASSERT_NE(at, 0u);
   // The least and the greatest of all; the first page's.
-  for (const size_t field : {0u, 4u, 8u, 9u}) {
+  for (const size_t field : {0u, 4u, 8u}) {
     Bytes bad = good;
-    bad[at + field] = bad[at + field] == std::byte{100} ? std::byte{101} : std::byte{100};
+    bad[at + field] = bad[at + field] == std::byte{0x55} ? std::byte{0x66} : std::byte{0x55};
     voxkit::test::repair(bad);
     Context ctx = context();
     const Status status = open(bad)->check(ctx);
@@ -98,7 +98,7 @@ TEST(PageRanges, OfMoreOrFewerPagesAreRefused) {
   const Bytes good = file_of(VoxelFormat::density8, made(VoxelFormat::density8, Content::noise));
   for (size_t i = 0; i < open(good)->container().table().size(); ++i) {
     if (open(good)->container().table()[i].kind != ranges_kind) continue;
-    for (const int change : {-1, -2}) {
+    for (const int change : {-1, -4}) {
       Bytes bad = good;
       const size_t entry = good.size() - 64 - 64 * (open(good)->container().table().size() - i);
       uint64_t length;

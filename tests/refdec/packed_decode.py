@@ -249,16 +249,16 @@ class Packed:
         data = self.content(key)
         require(len(data) >= 8, "chunk RNGE: {} bytes", len(data))
         least, greatest = struct.unpack("<2I", data[:8])
-        step, at, seen = (greatest - least) // 256 + 1, 8, set()
+        step, at, seen = (greatest - least) // 16 + 1, 8, set()
         for place in itertools.product(*map(range, self.pages(0)[::-1])):
             if len(self.page(0, place[::-1], 0)) <= self.models[0][0].value_bytes:
                 continue
-            require(at + 2 <= len(data), "chunk RNGE: fewer pages than are coded")
+            require(at < len(data), "chunk RNGE: fewer pages than are coded")
             codes = {code for code in self.decoded(0, place[::-1], 0) if self.finite(code)}
             seen |= codes
-            low, high = (least + data[at] * step, least + data[at + 1] * step + step - 1)
+            low, high = least + data[at] % 16 * step, least + data[at] // 16 * step + step - 1
             require(all(low <= code <= high for code in codes), "chunk RNGE: byte {}: other codes than are there", at)
-            at += 2
+            at += 1
         require(at == len(data), "chunk RNGE: more pages than are coded")
         require((least, greatest) == (min(seen), max(seen)) if seen else least > greatest,
                 "chunk RNGE: codes of {} to {}", least, greatest)
