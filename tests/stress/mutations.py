@@ -175,7 +175,7 @@ def judge(command, code, err, peak, folder):
     tool = command[0].rsplit("/", 1)[1]
     own = tuple(f"{name}: " for name in (tool, *(command[1:] if code == 0 else ())))  # or of what was done, of a file
     wrong = [line for line in err.splitlines() if not line.startswith(own)]
-    if code == 2 and "--roi: the box is not inside" in err:
+    if code == 2 and ("--roi: the box is not inside" in err or "expected larger steps" in err):
         code = 3  # of extents that were changed
     if code not in (0, 1, 3, 5):
         raise Found(f"exit {code}: {err}")
