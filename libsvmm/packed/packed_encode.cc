@@ -37,8 +37,8 @@ constexpr size_t least_values_of_coarse_floats = 1024;
 /// Of a level, to learn what a bound leads to: fitting takes much longer than coding.
 constexpr uint64_t fewest_fitted = 16, most_fitted = 64, share_fitted = 8;
 constexpr int sampling_rounds = 2;
-/// So few are decoded at once where it matters which values they have.
-constexpr uint64_t most_pages_without_ranges = 8;
+/// Of level 0, at most, what its ranges take.
+constexpr uint64_t share_of_ranges = 64;
 /// Of a target: two are the rule.
 constexpr int most_attempts = 4;
 
@@ -130,6 +130,7 @@ class Encoder {
     decoded_.reset();
     squared_error_ = 0;
     ranges_.clear();
+    coded_bytes_ = 0;
     VOX_CHECK(set_bound(max_error));
     if (params_.map.kind == CodeKind::steps) VOX_CHECK(choose_map());
     ContainerWriter container(sink, Codec::svmm, container_version_for(written_), 0, *ctx_.memory);
@@ -151,8 +152,11 @@ class Encoder {
         VOX_CHECK(container.add(model_kind, static_cast<uint32_t>(fitted), 0, model->serialise()));
       }
       VOX_CHECK(encode(level, *model, container));
-      if (level == 0 && !has_no_means(info_) && grid(0).pages() > most_pages_without_ranges)
-        VOX_CHECK(container.add(ranges_kind, 0, 0, pack_ranges(ranges_)));
+      if (level == 0 && !has_no_means(info_)) {
+        const std::vector<std::byte> ranges = pack_ranges(ranges_);
+        if (share_of_ranges * ranges.size() <= coded_bytes_)
+          VOX_CHECK(container.add(ranges_kind, 0, 0, ranges));
+      }
       // What is there by now is a file of the coarser levels.
       VOX_CHECK(level == 0 ? container.finish() : container.checkpoint());
     }
@@ -428,8 +432,10 @@ class Encoder {
         });
       }));
       for (const double error : errors) squared_error_ += error;
-      for (size_t i = 0; i < ranges.size(); ++i)
+      for (size_t i = 0; i < ranges.size(); ++i) {
         if (encoded[i].size() > model.value_bytes()) ranges_.push_back(ranges[i]);
+        coded_bytes_ += encoded[i].size();
+      }
       if (level > 0) VOX_CHECK(decoded->write(batch));
       std::span<const std::vector<std::byte>> left = encoded;
       for (uint64_t p = part; p < end_part; ++p) {
@@ -460,6 +466,7 @@ class Encoder {
   std::unique_ptr<DecodedLevel> decoded_;  ///< the level above that which comes next
   double squared_error_ = 0;               ///< of level 0
   std::vector<CodeRange> ranges_;          ///< of the coded pages of level 0
+  uint64_t coded_bytes_ = 0;               ///< of the pages of level 0
 };
 
 /// Few colors are coded both ways, as names and by their channels, and the smaller file is kept.

@@ -31,6 +31,7 @@ size_t place_of(const Bytes& file) {
 }
 
 TEST(PageRanges, HoldAndAreNoneTooWide) {
+  int there = 0;
   for (const VoxelFormat format : {VoxelFormat::density8, VoxelFormat::density16, VoxelFormat::float32})
     for (const Content content : {Content::noise, Content::smooth, Content::blobs, Content::specials})
       for (const double bound : {0.0, 2.0}) {
@@ -39,7 +40,10 @@ TEST(PageRanges, HoldAndAreNoneTooWide) {
         Context ctx = context();
         ASSERT_TRUE(volume->check(ctx));
         const auto ranges = page_ranges(*volume);
-        ASSERT_TRUE(ranges && *ranges);
+        ASSERT_TRUE(ranges);
+        // Not where they would take more than a 64th of what they are of.
+        if (!*ranges) continue;
+        ++there;
         const auto values = numbers(decode(*volume), format);
         const PageGrid grid(dims, 16);
         ASSERT_EQ((*ranges)->pages.size(), grid.pages());
@@ -65,6 +69,7 @@ TEST(PageRanges, HoldAndAreNoneTooWide) {
           EXPECT_LE(static_cast<double>(said.hi), hi + (greatest - least) / 15 + 1);
         }
       }
+  EXPECT_GE(there, 12);
 }
 
 TEST(PageRanges, OfLabelsAreNotThere) {
