@@ -54,9 +54,10 @@ Result<Report> encode(SurfaceSource& source, const Options& options, const Store
 /// functions are thread-safe.
 class Volume {
  public:
-  /// `memory`: what decoded images count against; it must outlive the volume. Null: a budget of its own.
+  /// `memory`: what decoded images, octrees and the DAGs that are made of them count against; it must outlive
+  /// the volume. Null: a budget of its own. `threads`: what an octree is decoded on.
   static Result<std::shared_ptr<const Volume>> open(std::shared_ptr<const Container> container,
-                                                    MemoryBudget* memory = nullptr);
+                                                    MemoryBudget* memory = nullptr, int threads = 1);
   ~Volume();
 
   /// The colours of a part, as many as it has.

@@ -13,6 +13,7 @@
 #include "libcolor/dag/dag_builder.h"
 #include "libcolor/dag/dag_recount.h"
 #include "libcolor/layout.h"
+#include "libcolor/octree/octree_encode.h"
 #include "libcolor/part_codecs.h"
 #include "libcolor/textures/astc.h"
 #include "libcolor/textures/image_codec.h"
@@ -102,6 +103,33 @@ class ColorWriter {
   uint64_t next_part_ = 0;
 };
 
+/// Writes where the voxels are, as nodes with pointers.
+Status write_dag(const Dag& dag, ContainerWriter& container, Params& p) {
+  VOX_CHECK(container.add(leaves_kind, 0, 0, std::as_bytes(std::span(dag.leaves))));
+  p.dag_bytes = dag.leaves.size() * sizeof(uint64_t);
+  for (int h = leaf_height + 1; h <= dag.height; ++h) {
+    const auto& nodes = dag.nodes[static_cast<size_t>(h)];
+    VOX_CHECK(container.add(nodes_kind, static_cast<uint32_t>(h), 0, std::as_bytes(std::span(nodes))));
+    p.dag_bytes += nodes.size() * sizeof(uint32_t);
+  }
+  p.root = dag.root;
+  p.dag_nodes = dag.node_count;
+  return {};
+}
+
+/// Or as the masks of an octree.
+Status write_octree(const Dag& dag, ContainerWriter& container, Params& p, Context& ctx) {
+  Reservation memory(*ctx.memory);
+  VOX_TRY(const Octree octree, octree_of(dag, memory));
+  VOX_TRY(const EncodedOctree encoded, encode_octree(octree, ctx));
+  p.dag_bytes = encoded.bytes;
+  p.dag_nodes = encoded.nodes;
+  VOX_CHECK(container.add(octree_kind, 0, 0, encoded.directory));
+  for (uint32_t part = 0; part < encoded.parts.size(); ++part)
+    VOX_CHECK(container.add(masks_kind, 0, part, encoded.parts[part]));
+  return {};
+}
+
 /// Room for more colours, ahead of need: counted, and so is the copy while they move.
 Status make_room(std::vector<Rgb>& held, size_t more, Reservation& reservation) {
   if (held.capacity() - held.size() >= more) return {};
@@ -190,22 +218,16 @@ Result<Report> encode(SurfaceSource& source, const Options& options, const Store
 
   Report report;
   Params& p = report.params;
-  VOX_CHECK(container.add(leaves_kind, 0, 0, std::as_bytes(std::span(dag.leaves))));
-  p.dag_bytes = dag.leaves.size() * sizeof(uint64_t);
-  for (int h = leaf_height + 1; h <= height; ++h) {
-    const auto& nodes = dag.nodes[static_cast<size_t>(h)];
-    VOX_CHECK(container.add(nodes_kind, static_cast<uint32_t>(h), 0, std::as_bytes(std::span(nodes))));
-    p.dag_bytes += nodes.size() * sizeof(uint32_t);
-  }
+  p.geometry = options.geometry;
+  VOX_CHECK(p.geometry == Geometry::dag ? write_dag(dag, container, p)
+                                        : write_octree(dag, container, p, ctx));
   p.codec = options.codec;
   p.colors = options.colors;
   p.counts = options.counts;
   p.curve = options.curve;
   p.height = height;
-  p.root = dag.root;
   p.leaf_voxels = dag.voxels;
   p.color_count = dag.color_count;
-  p.dag_nodes = dag.node_count;
   p.color_bytes = colors.bytes;
   p.blocks = colors.blocks;
   if (palette) p.palette_colors = static_cast<uint32_t>(palette->colors().size());

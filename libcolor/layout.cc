@@ -38,6 +38,7 @@ std::vector<std::byte> pack_params(const Params& p) {
     bytes[89] = static_cast<std::byte>(p.block_size.height);
   }
   bytes[90] = static_cast<std::byte>(p.space);
+  bytes[91] = static_cast<std::byte>(p.geometry);
   store_le(&bytes[8], p.leaf_voxels);
   store_le(&bytes[16], p.color_count);
   store_le(&bytes[24], p.root);
@@ -92,6 +93,9 @@ Result<Params> unpack_params(std::span<const std::byte> bytes, const VolumeInfo&
           88, fmt::format("blocks of {} x {}: not a size of ASTC", p.block_size.width, p.block_size.height));
   }
   p.space = field(90) == 1 ? ErrorSpace::lab : ErrorSpace::rgb;
+  p.geometry = static_cast<Geometry>(field(91));
+  if (p.geometry != Geometry::dag && p.geometry != Geometry::octree)
+    return bad(91, fmt::format("unknown geometry {}", field(91)));
   p.height = field(4);
   p.weight_bits = field(5);
   p.leaf_voxels = number(8);

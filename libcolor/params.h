@@ -19,6 +19,12 @@ enum class Counts : uint8_t {
   pointer = 2,  ///< beside pointers: fewer words to read on the way
 };
 
+/// How it is stored where voxels are. Numbers are part of FORMAT.md.
+enum class Geometry : uint8_t {
+  dag = 0,     ///< nodes with pointers, equal ones once: for access
+  octree = 2,  ///< masks alone, entropy-coded: for storage; a DAG is made of it in memory where one is needed
+};
+
 /// In which order a walk comes to the octants of a cell. Numbers are part of FORMAT.md.
 enum class Curve : uint8_t {
   morton = 1,
@@ -104,6 +110,7 @@ struct Options {
   int quality = 100;  ///< of astc: 100: blocks of 4 x 4; down to 0: of 12 x 12; of images: ImageCoding
   Colors colors = Colors::leaf;
   Counts counts = Counts::node;
+  Geometry geometry = Geometry::dag;
   Curve curve = Curve::morton;  ///< in which order voxels have their colours
   int zstd = 0;                 ///< level of zstd for the file's chunks, 1 to 19; 0: as they are
 };
@@ -116,6 +123,7 @@ struct Params {
   ColorCodec codec = ColorCodec::vws;
   Colors colors = Colors::leaf;
   Counts counts = Counts::node;
+  Geometry geometry = Geometry::dag;
   Curve curve = Curve::morton;
   Endpoints endpoints = Endpoints::rgb565;
   ImageCurve image_curve = ImageCurve::morton;  ///< of textures and images
@@ -129,8 +137,8 @@ struct Params {
   double threshold = 0;
   ErrorSpace space = ErrorSpace::rgb;  ///< of the threshold
   double grmse = 0;          ///< root mean square of the errors of all channels of all colours, 0 to 255
-  uint64_t dag_nodes = 0;    ///< leaf words not counted
-  uint64_t dag_bytes = 0;    ///< of nodes and leaf words
+  uint64_t dag_nodes = 0;    ///< leaf words not counted; of an octree, all nodes
+  uint64_t dag_bytes = 0;    ///< of nodes and leaf words; of an octree, of all of it
   uint64_t color_bytes = 0;  ///< of all parts
   uint64_t macro_blocks = 0, blocks = 0;
 };

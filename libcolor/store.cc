@@ -4,11 +4,15 @@
 
 #include <algorithm>
 
+#include "libcolor/octree/octree_dag.h"
+
 #include "libcolor/part_codecs.h"
 #include "libcolor/textures/image_codec.h"
 
 namespace voxkit::color {
 namespace {
+
+constexpr size_t none = ~size_t{0};
 
 /// Colours below the root, as the nodes say. With counts beside pointers, where no node says how many it has,
 /// those on the way to the last octant do.
@@ -33,50 +37,49 @@ uint64_t all_colors(const DagView& view) {
 
 }  // namespace
 
+Store::Store(MemoryBudget& memory, int threads) : memory_(memory), made_memory_(memory) {
+  ctx_.threads = threads;
+  ctx_.memory = &memory;
+}
+
 Status Store::find_chunks(const Container& container, const Params& params) {
   const auto& table = container.table();
   const auto bad = [&](const std::string& what) { return bad_input(container.name(), "table: " + what); };
-  constexpr size_t none = ~size_t{0};
   const uint64_t parts = part_count(params.color_count);
   if (parts > table.size()) return bad(fmt::format("fewer chunks COLR than {}", parts));
-  leaves_ = none;
+  const bool octree = params.geometry == Geometry::octree;
+  leaves_ = octree_directory_ = none;
   nodes_.assign(static_cast<size_t>(params.height - leaf_height), none);
   parts_.assign(parts, none);
+  if (octree)
+    masks_.assign(static_cast<size_t>(std::ranges::count(table, masks_kind, &ChunkEntry::kind)), none);
   for (size_t i = 0; i < table.size(); ++i) {
     const ChunkEntry& entry = table[i];
-    const auto place = [&](size_t& slot, bool known) -> Status {
-      if (known && slot == none) {
-        slot = i;
-        return {};
-      }
-      return bad(fmt::format("chunk {} {}.{}: not expected, or twice",
-                             entry.kind == leaves_kind  ? "LEAF"
-                             : entry.kind == nodes_kind ? "NODE"
-                                                        : "COLR",
-                             entry.index, entry.part));
+    const auto place = [&](std::string_view kind, size_t* slot) -> Status {
+      if (slot == nullptr || *slot != none)
+        return bad(fmt::format("chunk {} {}.{}: not expected, or twice", kind, entry.index, entry.part));
+      *slot = i;
+      return {};
     };
-    size_t nowhere = 0;
+    const auto part_of = [&](std::vector<size_t>& slots) {
+      return entry.index == 0 && entry.part < slots.size() ? &slots[entry.part] : nullptr;
+    };
+    const bool only = entry.index == 0 && entry.part == 0;
     if (entry.kind == leaves_kind) {
-      VOX_CHECK(place(leaves_, entry.index == 0 && entry.part == 0));
+      VOX_CHECK(place("LEAF", only && !octree ? &leaves_ : nullptr));
     } else if (entry.kind == nodes_kind) {
-      const bool known =
-          entry.index > leaf_height && entry.index <= static_cast<uint32_t>(params.height) && entry.part == 0;
-      VOX_CHECK(place(known ? nodes_[entry.index - leaf_height - 1] : nowhere, known));
+      const bool known = !octree && entry.index > leaf_height &&
+                         entry.index <= static_cast<uint32_t>(params.height) && entry.part == 0;
+      VOX_CHECK(place("NODE", known ? &nodes_[entry.index - leaf_height - 1] : nullptr));
+    } else if (entry.kind == octree_kind) {
+      VOX_CHECK(place("OCTD", only && octree ? &octree_directory_ : nullptr));
+    } else if (entry.kind == masks_kind) {
+      VOX_CHECK(place("MASK", part_of(masks_)));
     } else if (entry.kind == colors_kind) {
-      const bool known = entry.index == 0 && entry.part < parts;
-      VOX_CHECK(place(known ? parts_[entry.part] : nowhere, known));
+      VOX_CHECK(place("COLR", part_of(parts_)));
     }
   }
-  if (leaves_ == none) return bad("no chunk LEAF");
-  if (table[leaves_].length % sizeof(uint64_t) != 0 || table[leaves_].length == 0)
-    return bad(fmt::format("chunk LEAF has {} bytes: expected a multiple of 8", table[leaves_].length));
-  for (size_t h = 0; h < nodes_.size(); ++h) {
-    if (nodes_[h] == none) return bad(fmt::format("no chunk NODE {}", h + leaf_height + 1));
-    const uint64_t length = table[nodes_[h]].length;
-    if (length % sizeof(uint32_t) != 0)
-      return bad(
-          fmt::format("chunk NODE {} has {} bytes: expected a multiple of 4", h + leaf_height + 1, length));
-  }
+  VOX_CHECK(check_geometry(container, params));
   for (uint64_t part = 0; part < parts; ++part) {
     if (parts_[part] == none) return bad(fmt::format("no chunk COLR 0.{}", part));
     const uint64_t length = table[parts_[part]].length;
@@ -91,6 +94,24 @@ Status Store::find_chunks(const Container& container, const Params& params) {
   return find_palette(container, params);
 }
 
+Status Store::check_geometry(const Container& container, const Params& params) const {
+  const auto& table = container.table();
+  const auto bad = [&](const std::string& what) { return bad_input(container.name(), "table: " + what); };
+  if (params.geometry == Geometry::octree)
+    return octree_directory_ == none ? Status(bad("no chunk OCTD")) : Status();
+  if (leaves_ == none) return bad("no chunk LEAF");
+  if (table[leaves_].length % sizeof(uint64_t) != 0 || table[leaves_].length == 0)
+    return bad(fmt::format("chunk LEAF has {} bytes: expected a multiple of 8", table[leaves_].length));
+  for (size_t h = 0; h < nodes_.size(); ++h) {
+    if (nodes_[h] == none) return bad(fmt::format("no chunk NODE {}", h + leaf_height + 1));
+    const uint64_t length = table[nodes_[h]].length;
+    if (length % sizeof(uint32_t) != 0)
+      return bad(
+          fmt::format("chunk NODE {} has {} bytes: expected a multiple of 4", h + leaf_height + 1, length));
+  }
+  return {};
+}
+
 Status Store::find_palette(const Container& container, const Params& params) {
   if (params.codec != ColorCodec::palette) return {};
   VOX_TRY(const auto bytes, container.only_chunk(palette_kind));
@@ -102,10 +123,29 @@ Status Store::find_palette(const Container& container, const Params& params) {
   return {};
 }
 
-Result<const DagView*> Store::dag(const Container& container, const Params& params) const {
-  if (const DagView* const ready = ready_.load(std::memory_order_acquire)) return ready;
+Status Store::open_octree(const Container& container, const Params& params) const {
+  if (octree_) return {};
+  VOX_TRY(const auto directory, container.chunk(octree_directory_));
+  std::vector<uint64_t> sizes;
+  for (const size_t part : masks_) sizes.push_back(container.table()[part].length);
+  auto reader = OctreeReader::open(
+      directory, params.height, params.leaf_voxels, std::move(sizes),
+      [this, &container](uint64_t part) { return container.chunk(masks_[part]); }, memory_);
+  if (!reader) return fail(reader.error().code, container.name(), "chunk OCTD: " + reader.error().what);
+  octree_ = std::move(*reader);
+  return {};
+}
+
+Result<OctreeReader*> Store::octree(const Container& container, const Params& params) const {
+  if (params.geometry != Geometry::octree || params.colors != Colors::leaf || params.curve != Curve::morton ||
+      ready_.load(std::memory_order_acquire) != nullptr)
+    return nullptr;
   const std::lock_guard lock(mutex_);
-  if (view_) return &*view_;
+  VOX_CHECK(open_octree(container, params));
+  return octree_.get();
+}
+
+Result<DagView> Store::view_of_chunks(const Container& container, const Params& params) const {
   DagView view;
   view.height = params.height;
   view.colors = params.colors;
@@ -120,6 +160,26 @@ Result<const DagView*> Store::dag(const Container& container, const Params& para
     VOX_TRY(const auto nodes, container.chunk(nodes_[h]));
     view.nodes[h + leaf_height + 1] = reinterpret_cast<const uint32_t*>(nodes.data());
     view.words[h + leaf_height + 1] = nodes.size() / sizeof(uint32_t);
+  }
+  return view;
+}
+
+Result<const DagView*> Store::dag(const Container& container, const Params& params) const {
+  if (const DagView* const ready = ready_.load(std::memory_order_acquire)) return ready;
+  const std::lock_guard lock(mutex_);
+  if (view_) return &*view_;
+  DagView view;
+  if (params.geometry == Geometry::octree) {
+    VOX_CHECK(open_octree(container, params));
+    auto dag = dag_of(*octree_, params.colors, params.counts, params.curve, ctx_);
+    if (!dag) return fail(dag.error().code, container.name(), dag.error().what);
+    made_ = std::move(*dag);
+    uint64_t bytes = made_.leaves.size() * sizeof(uint64_t);
+    for (const auto& nodes : made_.nodes) bytes += nodes.size() * sizeof(uint32_t);
+    VOX_CHECK(made_memory_.add(bytes, "the DAG of an octree"));
+    view = view_of(made_);
+  } else {
+    VOX_TRY(view, view_of_chunks(container, params));
   }
   if (params.leaf_voxels > 0 && all_colors(view) != params.color_count)
     return bad_input(container.name(),
@@ -146,7 +206,7 @@ void Store::report(const Container& container, const std::string& what) const {
   if (status_) status_ = bad_input(container.name(), what);
 }
 
-void Store::decode_images(const Container& container, const Params& params, MemoryBudget& memory) {
+void Store::decode_images(const Container& container, const Params& params) {
   if (!makes_images(params.codec)) return;
   decode_parts(
       [&](uint64_t number) -> Result<std::vector<Rgb>> {
@@ -158,11 +218,11 @@ void Store::decode_images(const Container& container, const Params& params, Memo
                       fmt::format("chunk COLR 0.{}: {}", number, colors.error().what));
         return colors;
       },
-      image_part_work_bytes(params.codec), memory);
+      image_part_work_bytes(params.codec));
 }
 
-void Store::decode_parts(DecodedParts::Decode decode, uint64_t work_bytes, MemoryBudget& memory) {
-  decoded_ = std::make_unique<DecodedParts>(parts_.size(), memory, work_bytes, std::move(decode));
+void Store::decode_parts(DecodedParts::Decode decode, uint64_t work_bytes) {
+  decoded_ = std::make_unique<DecodedParts>(parts_.size(), memory_, work_bytes, std::move(decode));
 }
 
 std::shared_ptr<const DecodedParts::Part> Store::decoded(uint64_t number) const {
@@ -175,6 +235,7 @@ std::shared_ptr<const DecodedParts::Part> Store::decoded(uint64_t number) const 
 
 Status Store::status() const {
   const std::lock_guard lock(mutex_);
+  if (status_ && octree_) return octree_->status();
   return status_;
 }
 

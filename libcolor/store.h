@@ -8,6 +8,7 @@
 
 #include "libcolor/dag/dag_view.h"
 #include "libcolor/layout.h"
+#include "libcolor/octree/octree_reader.h"
 #include "libcolor/palette/palette_layout.h"
 #include "libcolor/textures/decoded_parts.h"
 #include "libcolor/textures/texture.h"
@@ -16,14 +17,21 @@ namespace voxkit::color {
 
 class Store {
  public:
+  /// What is made of an octree, or decoded, counts against `memory`, which must outlive the store; an octree
+  /// is decoded on so many threads.
+  Store(MemoryBudget& memory, int threads);
+  int threads() const { return ctx_.threads; }
   /// Finds the chunks that follow from the parameters, and no others; verifies the palette.
   Status find_chunks(const Container& container, const Params& params);
   /// Of images: what parts are decoded by. The arguments must outlive the store.
-  void decode_images(const Container& container, const Params& params, MemoryBudget& memory);
+  void decode_images(const Container& container, const Params& params);
   /// Colours of parts come from `decode`, whatever the codec.
-  void decode_parts(DecodedParts::Decode decode, uint64_t work_bytes, MemoryBudget& memory);
-  /// The DAG, all of which is verified now.
+  void decode_parts(DecodedParts::Decode decode, uint64_t work_bytes);
+  /// The DAG, all of which is verified now; or made of the octree.
   Result<const DagView*> dag(const Container& container, const Params& params) const;
+  /// The octree whose voxels have colours in their own order, where that is what the file has and no DAG has
+  /// been made of it; else null.
+  Result<OctreeReader*> octree(const Container& container, const Params& params) const;
   /// The bytes of a part of the colours; null if it is damaged, which `status` then tells.
   const std::byte* part(uint64_t number, const Container& container) const {
     const std::byte* const data = found_[number].load(std::memory_order_acquire);
@@ -42,16 +50,26 @@ class Store {
   [[gnu::cold]] void report(const Container& container, const std::string& what) const;
 
  private:
+  Status check_geometry(const Container& container, const Params& params) const;
   Status find_palette(const Container& container, const Params& params);
+  Status open_octree(const Container& container, const Params& params) const;
+  Result<DagView> view_of_chunks(const Container& container, const Params& params) const;
   [[gnu::cold]] const std::byte* verify(uint64_t number, const Container& container) const;
 
-  size_t leaves_ = 0;          ///< index into the container's table
+  MemoryBudget& memory_;
+  Context ctx_;
+  // Indices into the container's table:
+  size_t leaves_ = 0, octree_directory_ = 0;
   std::vector<size_t> nodes_;  ///< by height, from 3 on
+  std::vector<size_t> masks_;  ///< parts of the octree's
   std::vector<size_t> parts_;
   std::vector<uint64_t> sizes_;  ///< of parts
   PaletteBytes palette_;
   std::unique_ptr<std::atomic<const std::byte*>[]> found_;
   mutable std::mutex mutex_;
+  mutable std::unique_ptr<OctreeReader> octree_;
+  mutable Dag made_;  ///< of an octree
+  mutable Reservation made_memory_;
   mutable std::optional<DagView> view_;
   mutable std::atomic<const DagView*> ready_{nullptr};
   mutable Status status_;

@@ -21,8 +21,8 @@ Index3 octant_corner(Index3 corner, uint32_t octant, int64_t side) {
   return corner + Index3(octant & 1, octant >> 1 & 1, octant >> 2) * side;
 }
 
-/// Walks through the nodes that touch a box, in Morton order. `visit` gets leaf words, where they begin, the
-/// number of their first colour and how they are gone through, and says whether to go on.
+/// Walks through the nodes of a DAG that touch a box, in Morton order. `visit` gets leaf words, where they
+/// begin, the number of their first colour and how they are gone through, and says whether to go on.
 class BoxWalk {
  public:
   BoxWalk(const DagView& view, const Box& box) : view_(view), box_(box) {}
@@ -67,23 +67,36 @@ class BoxWalk {
   Box box_;
 };
 
+/// The same through an octree or a DAG, whichever there is; false if `visit` did not go on.
+template <class Visit>
+Result<bool> walk_box(const Volume& volume, const Box& box, const Visit& visit) {
+  const Store& store = volume.store();
+  VOX_TRY(OctreeReader* const octree, store.octree(volume.container(), volume.params()));
+  if (octree != nullptr)
+    return octree->for_each_word(box, [&](uint64_t word, Index3 corner, uint64_t first) {
+      return visit(word, corner, first, morton_state);
+    });
+  VOX_TRY(const DagView* const view, store.dag(volume.container(), volume.params()));
+  return BoxWalk(*view, box).run(visit);
+}
+
 }  // namespace
 
 Volume::Volume() = default;
 Volume::~Volume() = default;
 
 Result<std::shared_ptr<const Volume>> Volume::open(std::shared_ptr<const Container> container,
-                                                   MemoryBudget* memory) {
+                                                   MemoryBudget* memory, int threads) {
   const std::string& file = container->name();
   if (container->codec() != Codec::color) return bad_input(file, "header, byte 10: not a coloured surface");
   std::shared_ptr<Volume> volume(new Volume);
   VOX_TRY(volume->info_, read_volume_info(*container));
   VOX_TRY(const auto params_bytes, container->only_chunk(params_kind));
   VOX_TRY(volume->params_, unpack_params(params_bytes, volume->info_, file));
-  volume->store_ = std::make_unique<Store>();
-  VOX_CHECK(volume->store_->find_chunks(*container, volume->params_));
   if (memory == nullptr) memory = &volume->own_memory_.emplace();
-  volume->store_->decode_images(*container, volume->params_, *memory);
+  volume->store_ = std::make_unique<Store>(*memory, threads);
+  VOX_CHECK(volume->store_->find_chunks(*container, volume->params_));
+  volume->store_->decode_images(*container, volume->params_);
   volume->container_ = std::move(container);
   return volume;
 }
@@ -94,9 +107,9 @@ Result<std::shared_ptr<const Volume>> Volume::recolored(PartColors colors, uint6
   volume->container_ = container_;
   volume->info_ = info_;
   volume->params_ = params_;
-  volume->store_ = std::make_unique<Store>();
+  volume->store_ = std::make_unique<Store>(memory, store_->threads());
   VOX_CHECK(volume->store_->find_chunks(*container_, params_));
-  volume->store_->decode_parts(std::move(colors), work_bytes, memory);
+  volume->store_->decode_parts(std::move(colors), work_bytes);
   return volume;
 }
 
@@ -127,29 +140,31 @@ Status Volume::decode(const Box& box, VoxelSpan out) const {
   if (box.empty()) return {};
   if (!info_.box().contains(box))
     return fail(ErrorCode::internal, container_->name(), "box outside the volume");
-  VOX_TRY(const DagView* const view, store_->dag(*container_, params_));
   fill(out, box.size(), VoxelFormat::rgba32, {});
   ColorReader reader(*store_, *container_, params_);
-  BoxWalk(*view, box).run([&](uint64_t leaf, Index3 corner, uint64_t color, OrderState state) {
+  VOX_CHECK(walk_box(*this, box, [&](uint64_t leaf, Index3 corner, uint64_t color, OrderState state) {
     const bool inside = box.contains(Box{corner, corner + leaf_side});
     for (uint64_t left = leaf; left != 0; left &= left - 1) {
       const auto bit = static_cast<uint32_t>(std::countr_zero(left));
       const auto at = morton_place(bit);
       const Index3 place = corner + Index3(at);
       if (!inside && !box.contains(place)) continue;
-      const Voxel voxel = opaque(reader.color(color + leaf_index(leaf, bit, view->colors, state)));
+      const Voxel voxel = opaque(reader.color(color + leaf_index(leaf, bit, params_.colors, state)));
       const Index3 to = place - box.lo;
       std::memcpy(out.row(to.y, to.z) + to.x * 4, voxel.bytes.data(), 4);
     }
     return true;
-  });
+  }));
   return store_->status();
 }
 
 std::optional<Voxel> Volume::uniform(const Box& box) const {
   if (params_.leaf_voxels == 0) return Voxel{};
+  if (box.empty()) return std::nullopt;
+  if (const auto octree = store_->octree(*container_, params_); octree && *octree != nullptr)
+    return (*octree)->is_void(box) ? std::optional(Voxel{}) : std::nullopt;
   const auto view = store_->dag(*container_, params_);
-  if (!view || box.empty()) return std::nullopt;
+  if (!view) return std::nullopt;
   // Along the sides of a large box there may be many nodes: then it is not known.
   VoidSearch is_void(**view, 4096);
   const auto corner = [](Index3 at, uint32_t(&out)[3]) {
@@ -161,9 +176,10 @@ std::optional<Voxel> Volume::uniform(const Box& box) const {
   return is_void(lo, hi) ? std::optional(Voxel{}) : std::nullopt;
 }
 
-Status Volume::for_each_voxel(const SurfaceSource::Sink& sink, Context&) const {
-  VOX_TRY(const DagView* const view, store_->dag(*container_, params_));
+Status Volume::for_each_voxel(const SurfaceSource::Sink& sink, Context& ctx) const {
   if (params_.leaf_voxels == 0) return {};
+  VOX_TRY(OctreeReader* const octree, store_->octree(*container_, params_));
+  if (octree != nullptr) VOX_CHECK(octree->decode_all(ctx));
   ColorReader reader(*store_, *container_, params_);
   constexpr size_t run_voxels = 1 << 16;
   std::vector<SurfaceVoxel> run;
@@ -177,14 +193,14 @@ Status Volume::for_each_voxel(const SurfaceSource::Sink& sink, Context&) const {
     run.clear();
     return status.has_value();
   };
-  const bool complete =
-      BoxWalk(*view, info_.box()).run([&](uint64_t leaf, Index3 corner, uint64_t color, OrderState state) {
+  const auto complete =
+      walk_box(*this, info_.box(), [&](uint64_t leaf, Index3 corner, uint64_t color, OrderState state) {
         const uint64_t first = morton_code(static_cast<uint32_t>(corner.x), static_cast<uint32_t>(corner.y),
                                            static_cast<uint32_t>(corner.z));
         // A word without voxels is of no surface, and there may be any number of them.
         // Counts that do not add up would give voxels the colors of others. (Along a Hilbert curve they come
         // in another order.)
-        if (view->colors == Colors::leaf && view->curve == Curve::morton && color != found) {
+        if (params_.colors == Colors::leaf && params_.curve == Curve::morton && color != found) {
           store_->report(*container_, "chunk NODE: counts of colors that do not add up");
           return false;
         }
@@ -192,13 +208,14 @@ Status Volume::for_each_voxel(const SurfaceSource::Sink& sink, Context&) const {
         if (leaf == 0 || found > params_.leaf_voxels) return false;
         for (uint64_t left = leaf; left != 0; left &= left - 1) {
           const auto bit = static_cast<uint32_t>(std::countr_zero(left));
-          run.push_back({first | bit, reader.color(color + leaf_index(leaf, bit, view->colors, state))});
+          run.push_back({first | bit, reader.color(color + leaf_index(leaf, bit, params_.colors, state))});
         }
         return run.size() < run_voxels || flush();
       });
-  if (complete) flush();
+  VOX_CHECK(complete);
+  if (*complete) flush();
   if (status) status = store_->status();
-  if (status && (!complete || found != params_.leaf_voxels))
+  if (status && (!*complete || found != params_.leaf_voxels))
     return bad_input(container_->name(),
                      fmt::format("chunk DAGP, byte 8: {} voxels: others are there", params_.leaf_voxels));
   return status;

@@ -18,7 +18,7 @@ struct Options {
   std::string input, output, tiles;
   SurfaceOptions surface;
   std::string kind = "thin", codec = "vws", image_curve = "morton", curve = "morton", colors = "leaf",
-              counts = "node", space = "srgb", emissive = "add";
+              counts = "node", space = "srgb", emissive = "add", geometry = "auto", purpose = "access";
   color::Options encoder;
   std::optional<uint32_t> palette;
   bool verify = false;
@@ -78,6 +78,13 @@ void declare(CommandLine& line, Options& o) {
               one_of(o.colors, {"leaf", "all"}));
   line.option("--counts", "WHERE", "node: counts in nodes; pointer: beside pointers, larger, faster (node)",
               one_of(o.counts, {"node", "pointer"}));
+  line.option("--geometry", "HOW",
+              "dag: nodes with pointers, looked up and drawn from the file; octree: masks alone, "
+              "entropy-coded, a fifth to a tenth of that, decoded as a whole before it is drawn; auto: dag, or octree "
+              "for storage (auto)",
+              one_of(o.geometry, {"auto", "dag", "octree"}));
+  line.option("--for", "WHAT", "What the file is made for: access or storage, which sets what is auto (access)",
+              one_of(o.purpose, {"access", "storage"}));
   line.file("--tiles", "PATTERN",
             "Of a .dagc file: take the colours from the images that vox-decode --tiles wrote of it, such as "
             "tile-%04d.png; where codec and ending agree they are stored as they are",
@@ -101,6 +108,8 @@ color::Options encoder_options(const Options& o) {
   options.curve = o.curve == "hilbert" ? color::Curve::hilbert : color::Curve::morton;
   options.space = o.space == "lab" ? color::ErrorSpace::lab : color::ErrorSpace::rgb;
   options.colors = o.colors == "all" ? color::Colors::all : color::Colors::leaf;
+  const bool octree = o.geometry == "octree" || (o.geometry == "auto" && o.purpose == "storage");
+  options.geometry = octree ? color::Geometry::octree : color::Geometry::dag;
   options.counts = o.counts == "pointer" ? color::Counts::pointer : color::Counts::node;
   return options;
 }

@@ -16,19 +16,34 @@ Status DagBuilder::add(std::span<const SurfaceVoxel> voxels) {
     if (voxel.place < next_ || voxel.place >> (3 * height_) != 0)
       return fail(ErrorCode::internal, {}, fmt::format("voxel {:#x} out of order", voxel.place));
     next_ = voxel.place + 1;
-    if (voxel.place >> 6 != leaf_place_) {
-      if (leaf_ != 0) {
-        VOX_CHECK(close_leaf());
-        // All nodes below the lowest one that holds both are complete.
-        const int differing = 63 - std::countl_zero((voxel.place >> 6) ^ leaf_place_);
-        VOX_CHECK(close_up_to(leaf_height + differing / 3));
-      }
-      leaf_place_ = voxel.place >> 6;
-    }
+    VOX_CHECK(enter_word(voxel.place >> 6));
     leaf_ |= uint64_t{1} << (voxel.place & 63);
   }
   voxels_ += voxels.size();
   return pool_.check_memory();
+}
+
+Status DagBuilder::add_word(uint64_t place, uint64_t word) {
+  if (place << 6 < next_ || place >> (3 * (height_ - leaf_height)) != 0 || word == 0)
+    return fail(ErrorCode::internal, {}, fmt::format("word {:#x} out of order", place));
+  VOX_CHECK(enter_word(place));
+  leaf_ = word;
+  next_ = (place + 1) << 6;
+  voxels_ += static_cast<uint64_t>(std::popcount(word));
+  return {};
+}
+
+/// Closes what ends before a word.
+Status DagBuilder::enter_word(uint64_t place) {
+  if (place == leaf_place_) return {};
+  if (leaf_ != 0) {
+    VOX_CHECK(close_leaf());
+    // All nodes below the lowest one that holds both are complete.
+    const int differing = 63 - std::countl_zero(place ^ leaf_place_);
+    VOX_CHECK(close_up_to(leaf_height + differing / 3));
+  }
+  leaf_place_ = place;
+  return {};
 }
 
 void DagBuilder::append(int height, uint32_t octant, Subtree child) {

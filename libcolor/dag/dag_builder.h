@@ -17,10 +17,13 @@ class DagBuilder {
   DagBuilder(int height, Context& ctx);
   /// Appends voxels; places ascend strictly from call to call and are inside the grid (ErrorCode::internal).
   Status add(std::span<const SurfaceVoxel> voxels);
+  /// The same of all voxels of a cell of height 2, by its Morton code: a leaf word with at least one.
+  Status add_word(uint64_t place, uint64_t word);
   /// The DAG; of no voxels it has one leaf word, without any, and no nodes. Call it last.
   Result<Dag> finish();
 
  private:
+  Status enter_word(uint64_t place);
   Status close_leaf();
   Status close_up_to(int height);
   void append(int height, uint32_t octant, Subtree child);

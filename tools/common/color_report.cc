@@ -32,6 +32,7 @@ Json params_json(const color::Params& p) {
   json.set("curve", name(p.curve));
   json.set("colors", p.colors == color::Colors::leaf ? "leaf" : "all");
   json.set("counts", p.counts == color::Counts::node ? "node" : "pointer");
+  json.set("geometry", p.geometry == color::Geometry::dag ? "dag" : "octree");
   return json;
 }
 

@@ -46,7 +46,7 @@ Result<Input> open_codec(std::shared_ptr<const Container> container, std::option
   }
   if (container->codec() == Codec::color) {
     VOX_CHECK(check_level(1));
-    VOX_TRY(input.color, color::Volume::open(std::move(container), ctx.memory));
+    VOX_TRY(input.color, color::Volume::open(std::move(container), ctx.memory, ctx.threads));
     input.source = color::open_source(input.color);
     return input;
   }
