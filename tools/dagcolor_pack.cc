@@ -80,10 +80,12 @@ void declare(CommandLine& line, Options& o) {
               one_of(o.counts, {"node", "pointer"}));
   line.option("--geometry", "HOW",
               "dag: nodes with pointers, looked up and drawn from the file; octree: masks alone, "
-              "entropy-coded, a fifth to a tenth of that, decoded as a whole before it is drawn; auto: dag, or octree "
+              "entropy-coded, a fifth to a tenth of that, decoded as a whole before it is drawn; auto: dag, "
+              "or octree "
               "for storage (auto)",
               one_of(o.geometry, {"auto", "dag", "octree"}));
-  line.option("--for", "WHAT", "What the file is made for: access or storage, which sets what is auto (access)",
+  line.option("--for", "WHAT",
+              "What the file is made for: access or storage, which sets what is auto (access)",
               one_of(o.purpose, {"access", "storage"}));
   line.file("--tiles", "PATTERN",
             "Of a .dagc file: take the colours from the images that vox-decode --tiles wrote of it, such as "

@@ -25,7 +25,7 @@ class ContextTree {
     uint8_t number = 0;  ///< of a leaf: of its probability (libpage/decision.h); else 0
   };
 
-  /// A leaf, from which a tree can be grown.
+  /// A leaf, from which a tree can be grown; its number is to be set.
   ContextTree() : nodes_(1) {}
   const std::vector<Node>& nodes() const { return nodes_; }
   /// A leaf becomes a question about a fact, with two leaves: the first one's number, that of the answer no.

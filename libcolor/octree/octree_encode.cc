@@ -5,6 +5,7 @@
 #include "formats/little_endian.h"
 #include "formats/parallel.h"
 #include "libcolor/octree/context_fit.h"
+#include "libcolor/octree/context_lookup.h"
 #include "libpage/decision.h"
 
 namespace voxkit::color {
@@ -46,7 +47,8 @@ Result<ContextTree> grow_tree(const Octree& octree, int height, Context& ctx) {
   return std::move(samples).grow(pages / sampled, ctx);
 }
 
-std::vector<std::byte> encode_page(const Octree& octree, int height, uint64_t page, const ContextTree& tree) {
+std::vector<std::byte> encode_page(const Octree& octree, int height, uint64_t page,
+                                   const ContextLookup& tree) {
   std::vector<page::Decision> decisions;
   decisions.reserve(8 * page_nodes);
   visit_page(octree, height, page, [&](const Facts& facts, bool solid) {
@@ -70,10 +72,11 @@ Result<EncodedOctree> encode_octree(const Octree& octree, Context& ctx) {
     const OctreeLevel& level = octree.level(h);
     VOX_TRY(const ContextTree tree, grow_tree(octree, h, ctx));
     tree.write(trees);
+    const ContextLookup lookup(tree);
     std::vector<std::vector<std::byte>> pages(level.pages());
     VOX_CHECK(parallel_for(ctx, static_cast<int64_t>(pages.size()), [&](int64_t i) -> Status {
       const auto page = static_cast<uint64_t>(i);
-      pages[page] = encode_page(octree, h, page, tree);
+      pages[page] = encode_page(octree, h, page, lookup);
       return {};
     }));
     for (uint64_t page = 0; page < pages.size(); ++page) {

@@ -28,7 +28,8 @@ Result<std::unique_ptr<OctreeReader>> OctreeReader::open(std::span<const std::by
   const auto heights = static_cast<size_t>(height) + 1;
   reader->trees_.resize(heights);
   for (size_t h = heights - 1; h > 0; --h) {
-    VOX_TRY(reader->trees_[h], ContextTree::read(in));
+    VOX_TRY(const ContextTree tree, ContextTree::read(in));
+    reader->trees_[h] = ContextLookup(tree);
   }
   if (!in.at_end()) return wrong("its trees of contexts do not end where they should");
 
@@ -87,7 +88,7 @@ Status OctreeReader::decode_page(int height, uint64_t page) {
         {}, fmt::format("chunk MASK 0.{}: page {} of height {} is damaged", place.part, page, height));
   };
   NodeWalk walk(*octree_, height, page);
-  const ContextTree& tree = trees_[static_cast<size_t>(height)];
+  const ContextLookup& tree = trees_[static_cast<size_t>(height)];
   page::RansDecoder coder;
   coder.open(part.subspan(place.offset, place.bytes));
   const uint64_t first = page << page_nodes_log2, nodes = nodes_of_page(level.nodes(), page);
@@ -131,7 +132,7 @@ Status OctreeReader::decode_all(const Context& ctx) {
       return {};
     }));
   }
-  return {};
+  return status();
 }
 
 Status OctreeReader::status() const {

@@ -8,7 +8,7 @@
 
 #include "formats/volume.h"
 #include "libcolor/dag/dag.h"
-#include "libcolor/octree/context_tree.h"
+#include "libcolor/octree/context_lookup.h"
 #include "libcolor/octree/octree.h"
 #include "libcolor/surface/morton.h"
 
@@ -90,7 +90,7 @@ class OctreeReader {
   }
 
   std::optional<Octree> octree_;
-  std::vector<ContextTree> trees_;    ///< by height
+  std::vector<ContextLookup> trees_;  ///< by height
   std::vector<Page> pages_;           ///< of all heights, the highest first
   std::vector<uint64_t> first_page_;  ///< by height
   PartBytes parts_;

@@ -27,10 +27,11 @@ libcolor/surface  -> formats formats/mesh
 libcolor/terrain  -> formats libcolor/surface
 libcolor/terms    -> formats libcolor/surface
 libcolor/dag      -> formats libcolor/surface libcolor/terms
+libcolor/octree   -> formats libpage libcolor/surface libcolor/terms libcolor/dag
 libcolor/blocks   -> formats libcolor/surface libcolor/terms
 libcolor/palette  -> formats libcolor/surface libcolor/terms libcolor/blocks
 libcolor/textures -> formats formats/image libcolor/surface libcolor/terms libcolor/blocks
-libcolor          -> formats formats/image libcolor/surface libcolor/terms libcolor/dag libcolor/blocks libcolor/palette libcolor/textures
+libcolor          -> formats formats/image libcolor/surface libcolor/terms libcolor/dag libcolor/octree libcolor/blocks libcolor/palette libcolor/textures
 libmetrics        -> formats formats/image
 librender         -> formats formats/image
 librender/cast    -> formats librender libsvmm libsvmm/packed libcolor libcolor/dag libcolor/surface

@@ -32,6 +32,7 @@ const std::vector<Bytes>& files() {
           if (colors == Colors::all) options.threshold = 3;
           if ((counts == Counts::pointer) == (codec == ColorCodec::raw || codec == ColorCodec::vws))
             options.curve = Curve::hilbert;
+          if ((counts == Counts::pointer) == (colors == Colors::leaf)) options.geometry = Geometry::octree;
           if (counts == Counts::pointer) {
             options.image_curve = ImageCurve::hilbert;
             options.quality = 40;
