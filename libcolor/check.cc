@@ -17,7 +17,12 @@ namespace {
 /// What is below a node.
 struct Below {
   uint64_t voxels = 0, colors = 0;  ///< no voxels: no node begins here
+  uint64_t begin = 0;               ///< of nodes with symmetry: the first byte
 };
+/// Nodes with symmetry take five bytes or more, so these are apart.
+constexpr uint64_t place_of(uint64_t byte) {
+  return byte / 4;
+}
 
 class Checker {
  public:
@@ -49,11 +54,11 @@ class Checker {
       below[i] = {static_cast<uint64_t>(std::popcount(leaf)), leaf_colors(leaf, params_.colors)};
     }
     for (int h = leaf_height + 1; h <= params_.height; ++h) {
-      VOX_TRY(auto next, check_nodes(h, below));
+      VOX_TRY(auto next, view_.symmetric ? check_symmetric_nodes(h, below) : check_nodes(h, below));
       below = std::move(next);
     }
     if (params_.leaf_voxels == 0) return {};
-    const Below all = params_.root < below.size() ? below[params_.root] : Below{};
+    const Below all = below_root(below);
     if (all.voxels != params_.leaf_voxels || all.colors != params_.color_count)
       return bad(fmt::format("chunk DAGP: {} voxels and {} colors: below the root there are {} and {}",
                              params_.leaf_voxels, params_.color_count, all.voxels, all.colors));
@@ -62,6 +67,13 @@ class Checker {
     known_.resize((static_cast<size_t>(params_.height) + 1) * order_states);
     VOX_CHECK(check_offsets(params_.height, params_.root, first_state(params_.curve)));
     return {};
+  }
+
+  Below below_root(const std::vector<Below>& nodes) const {
+    const uint64_t address = view_.symmetric ? params_.root & address_mask : params_.root;
+    const bool bytes = view_.symmetric && params_.height > leaf_height;
+    const uint64_t place = bytes ? place_of(address) : address;
+    return place < nodes.size() && (!bytes || nodes[place].begin == address) ? nodes[place] : Below{};
   }
 
   /// The nodes of a height, one after the other; what is below each.
@@ -74,13 +86,14 @@ class Checker {
         return bad(fmt::format("chunk NODE {}, word {}: {}", h, at, rule));
       };
       const NodeRef node = view_.node(h, static_cast<uint32_t>(at));
-      if (node.words == nullptr) return broken("the node ends behind the chunk");
+      if (!node.there) return broken("the node ends behind the chunk");
       if (node.mask == 0) return broken("no octants");
       Below own{0, params_.colors == Colors::all ? uint64_t{1} : 0};
       const auto octants = static_cast<uint32_t>(std::popcount(node.mask));
       const bool beside = params_.counts == Counts::pointer;
-      for (uint32_t i = 0; i < octants; ++i) {
-        const uint32_t pointer = view_.pointer(node, i);
+      for (uint32_t octant = 0; octant < 8; ++octant) {
+        if (!node.has(octant)) continue;
+        const uint32_t pointer = view_.pointer(node, octant);
         if (pointer >= children.size() || children[pointer].voxels == 0)
           return broken(fmt::format("pointer {}: nothing begins there", pointer));
         own.voxels += children[pointer].voxels;
@@ -94,6 +107,47 @@ class Checker {
         return broken(fmt::format("a count of {}: expected that of {} colors", count, own.colors));
       below[at] = own;
       at += node_words(octants, wide, params_.counts);
+    }
+    return below;
+  }
+
+  /// The same of nodes with symmetry, by the place of their first byte.
+  Result<std::vector<Below>> check_symmetric_nodes(int h, const std::vector<Below>& children) {
+    const uint64_t bytes = view_.coded_bytes[static_cast<size_t>(h)];
+    VOX_CHECK(reservation_.add((place_of(bytes) + 1) * sizeof(Below), "a table of voxels below nodes"));
+    std::vector<Below> below(place_of(bytes) + 1);
+    for (uint64_t at = 0; at < bytes;) {
+      const auto broken = [&](const std::string& rule) {
+        return bad(fmt::format("chunk SNOD {}, byte {}: {}", h, at, rule));
+      };
+      const NodeRef node = view_.node(h, static_cast<uint32_t>(at));
+      const uint8_t* const behind = node.there ? DagView::behind_octants(node, 8) : nullptr;
+      if (!node.there || behind > node.end) return broken("the node ends behind the chunk");
+      if (node.mask == 0) return broken("no octants");
+      Below own{0, params_.colors == Colors::all ? uint64_t{1} : 0, at};
+      for (uint32_t octant = 0; octant < 8; ++octant) {
+        if (!node.has(octant)) continue;
+        const uint32_t pointer = view_.pointer(node, octant), address = pointer & address_mask;
+        Below child;
+        if (h == leaf_height + 1 && (address & word_in_node) != 0) {
+          const uint64_t word = view_.leaf(pointer);
+          if (word == 0 || leaf_octants(word) != node.above_words[address & ~word_in_node])
+            return broken(fmt::format("octant {}: a word without voxels", octant));
+          child = {static_cast<uint64_t>(std::popcount(word)), leaf_colors(word, params_.colors)};
+        } else {
+          const uint64_t place = h == leaf_height + 1 ? address : place_of(address);
+          if (place < children.size() && (h == leaf_height + 1 || children[place].begin == address))
+            child = children[place];
+        }
+        if (child.voxels == 0) return broken(fmt::format("pointer {}: nothing begins there", address));
+        own.voxels += child.voxels;
+        own.colors += child.colors;
+      }
+      if (view_.colors_below(h, static_cast<uint32_t>(at)) != own.colors)
+        return broken(fmt::format("a count of {}: expected that of {} colors",
+                                  view_.colors_below(h, static_cast<uint32_t>(at)), own.colors));
+      below[place_of(at)] = own;
+      at += static_cast<uint64_t>(behind - (view_.coded[static_cast<size_t>(h)] + at));
     }
     return below;
   }
@@ -148,7 +202,7 @@ class Checker {
     for (uint32_t octant = 0; octant < 8; ++octant) {
       if (!node.has(octant)) continue;
       const Index3 at = corner + Index3(octant & 1, octant >> 1 & 1, octant >> 2) * (int64_t{1} << (h - 1));
-      VOX_CHECK(check_extents(h - 1, view_.pointer(node, node.number(octant)), at));
+      VOX_CHECK(check_extents(h - 1, view_.pointer(node, octant), at));
     }
     return {};
   }

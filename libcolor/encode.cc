@@ -12,6 +12,7 @@
 #include "libcolor/dag/color_order.h"
 #include "libcolor/dag/dag_builder.h"
 #include "libcolor/dag/dag_recount.h"
+#include "libcolor/dag/symmetric_dag.h"
 #include "libcolor/layout.h"
 #include "libcolor/octree/octree_encode.h"
 #include "libcolor/part_codecs.h"
@@ -117,6 +118,21 @@ Status write_dag(const Dag& dag, ContainerWriter& container, Params& p) {
   return {};
 }
 
+/// The same with mirror images stored once.
+Status write_symmetric(const SymmetricDag& symmetric, ContainerWriter& container, Params& p) {
+  p.geometry = Geometry::ssvdag;
+  VOX_CHECK(container.add(leaves_kind, 0, 0, std::as_bytes(std::span(symmetric.leaves))));
+  p.dag_bytes = symmetric.leaves.size() * sizeof(uint64_t);
+  for (int h = leaf_height + 1; h <= symmetric.height; ++h) {
+    const auto& nodes = symmetric.nodes[static_cast<size_t>(h)];
+    VOX_CHECK(container.add(symmetric_kind, static_cast<uint32_t>(h), 0, std::as_bytes(std::span(nodes))));
+    p.dag_bytes += nodes.size();
+  }
+  p.root = symmetric.root;
+  p.dag_nodes = symmetric.node_count;
+  return {};
+}
+
 /// Or as the masks of an octree.
 Status write_octree(const Dag& dag, ContainerWriter& container, Params& p, Context& ctx) {
   Reservation memory(*ctx.memory);
@@ -128,6 +144,22 @@ Status write_octree(const Dag& dag, ContainerWriter& container, Params& p, Conte
   for (uint32_t part = 0; part < encoded.parts.size(); ++part)
     VOX_CHECK(container.add(masks_kind, 0, part, encoded.parts[part]));
   return {};
+}
+
+Status write_geometry(const Dag& dag, const Options& options, ContainerWriter& container, Params& p,
+                      Context& ctx) {
+  if (options.geometry == Geometry::octree) {
+    p.geometry = Geometry::octree;
+    return write_octree(dag, container, p, ctx);
+  }
+  if (options.geometry.value_or(Geometry::ssvdag) == Geometry::ssvdag && options.counts == Counts::node) {
+    const auto symmetric = symmetric_dag_of(dag, ctx);
+    if (symmetric) return write_symmetric(*symmetric, container, p);
+    if (options.geometry || symmetric.error().code != ErrorCode::limit)
+      return tl::unexpected<Error>(symmetric.error());
+    ctx.note("geometry is stored without symmetry: " + symmetric.error().what);
+  }
+  return write_dag(dag, container, p);
 }
 
 /// Room for more colours, ahead of need: counted, and so is the copy while they move.
@@ -156,6 +188,8 @@ Status validate(const Options& o) {
     return bad_usage(fmt::format("a palette of {} colors: expected 1 to {}", o.palette, most_palette_colors));
   if (o.image_palette != 0 && (o.image_palette < 2 || o.image_palette > 256))
     return bad_usage(fmt::format("a palette of {} colors: expected 2 to 256, or 0", o.image_palette));
+  if (o.geometry == Geometry::ssvdag && o.counts == Counts::pointer)
+    return bad_usage("counts beside pointers: expected --counts node with --geometry ssvdag");
   VOX_CHECK(part_codec(o.codec).support(o));
   if (o.effort < 1 || o.effort > 9) return bad_usage(fmt::format("effort {}: expected 1 to 9", o.effort));
   return {};
@@ -218,9 +252,7 @@ Result<Report> encode(SurfaceSource& source, const Options& options, const Store
 
   Report report;
   Params& p = report.params;
-  p.geometry = options.geometry;
-  VOX_CHECK(p.geometry == Geometry::dag ? write_dag(dag, container, p)
-                                        : write_octree(dag, container, p, ctx));
+  VOX_CHECK(write_geometry(dag, options, container, p, ctx));
   p.codec = options.codec;
   p.colors = options.colors;
   p.counts = options.counts;

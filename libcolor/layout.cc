@@ -94,8 +94,9 @@ Result<Params> unpack_params(std::span<const std::byte> bytes, const VolumeInfo&
   }
   p.space = field(90) == 1 ? ErrorSpace::lab : ErrorSpace::rgb;
   p.geometry = static_cast<Geometry>(field(91));
-  if (p.geometry != Geometry::dag && p.geometry != Geometry::octree)
-    return bad(91, fmt::format("unknown geometry {}", field(91)));
+  if (p.geometry > Geometry::octree) return bad(91, fmt::format("unknown geometry {}", field(91)));
+  if (p.geometry == Geometry::ssvdag && p.counts == Counts::pointer)
+    return bad(2, "counts beside pointers, which nodes with symmetry have not");
   p.height = field(4);
   p.weight_bits = field(5);
   p.leaf_voxels = number(8);

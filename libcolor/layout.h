@@ -11,9 +11,10 @@ namespace voxkit::color {
 
 inline constexpr uint32_t params_kind = chunk_kind("DAGP");
 inline constexpr uint32_t leaves_kind = chunk_kind("LEAF");
-inline constexpr uint32_t nodes_kind = chunk_kind("NODE");   ///< index: the height
-inline constexpr uint32_t octree_kind = chunk_kind("OCTD");  ///< an octree's directory
-inline constexpr uint32_t masks_kind = chunk_kind("MASK");   ///< and its pages, by part
+inline constexpr uint32_t nodes_kind = chunk_kind("NODE");      ///< index: the height
+inline constexpr uint32_t symmetric_kind = chunk_kind("SNOD");  ///< the same of an ssvdag
+inline constexpr uint32_t octree_kind = chunk_kind("OCTD");     ///< an octree's directory
+inline constexpr uint32_t masks_kind = chunk_kind("MASK");      ///< and its pages, by part
 inline constexpr uint32_t colors_kind = chunk_kind("COLR");
 inline constexpr uint32_t palette_kind = chunk_kind("PALT");
 

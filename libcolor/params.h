@@ -3,6 +3,7 @@
 #pragma once
 
 #include <cstdint>
+#include <optional>
 
 #include "formats/result.h"
 
@@ -21,7 +22,8 @@ enum class Counts : uint8_t {
 
 /// How it is stored where voxels are. Numbers are part of FORMAT.md.
 enum class Geometry : uint8_t {
-  dag = 0,     ///< nodes with pointers, equal ones once: for access
+  dag = 0,     ///< nodes with pointers, equal ones once: for access, as published
+  ssvdag = 1,  ///< mirror images once as well, pointers of 2 to 4 bytes: for access, smaller
   octree = 2,  ///< masks alone, entropy-coded: for storage; a DAG is made of it in memory where one is needed
 };
 
@@ -110,7 +112,9 @@ struct Options {
   int quality = 100;  ///< of astc: 100: blocks of 4 x 4; down to 0: of 12 x 12; of images: ImageCoding
   Colors colors = Colors::leaf;
   Counts counts = Counts::node;
-  Geometry geometry = Geometry::dag;
+  /// Not said: ssvdag, or dag with Counts::pointer, and where an ssvdag would take more than its pointers
+  /// reach or there is memory for.
+  std::optional<Geometry> geometry;
   Curve curve = Curve::morton;  ///< in which order voxels have their colours
   int zstd = 0;                 ///< level of zstd for the file's chunks, 1 to 19; 0: as they are
 };

@@ -23,7 +23,7 @@ uint64_t all_colors(const DagView& view) {
   OrderState state = first_state(view.curve);
   for (int h = view.height; h > leaf_height; --h) {
     const NodeRef node = view.node(h, pointer);
-    if (node.words == nullptr || node.mask == 0) return ~uint64_t{0};
+    if (!node.there || node.mask == 0) return ~uint64_t{0};
     uint8_t last = 0;
     for (const uint8_t octant : octant_orders.octant[state])
       if (node.has(octant)) last = octant;
@@ -33,6 +33,11 @@ uint64_t all_colors(const DagView& view) {
     state = octant_orders.next[state][last];
   }
   return before + leaf_colors(view.leaf(pointer), view.colors);
+}
+
+/// Of the chunks that nodes with pointers lie in.
+uint32_t kind_of_nodes(const Params& params) {
+  return params.geometry == Geometry::ssvdag ? symmetric_kind : nodes_kind;
 }
 
 }  // namespace
@@ -67,10 +72,11 @@ Status Store::find_chunks(const Container& container, const Params& params) {
     const bool only = entry.index == 0 && entry.part == 0;
     if (entry.kind == leaves_kind) {
       VOX_CHECK(place("LEAF", only && !octree ? &leaves_ : nullptr));
-    } else if (entry.kind == nodes_kind) {
-      const bool known = !octree && entry.index > leaf_height &&
+    } else if (entry.kind == nodes_kind || entry.kind == symmetric_kind) {
+      const bool known = entry.kind == kind_of_nodes(params) && !octree && entry.index > leaf_height &&
                          entry.index <= static_cast<uint32_t>(params.height) && entry.part == 0;
-      VOX_CHECK(place("NODE", known ? &nodes_[entry.index - leaf_height - 1] : nullptr));
+      VOX_CHECK(place(entry.kind == nodes_kind ? "NODE" : "SNOD",
+                      known ? &nodes_[entry.index - leaf_height - 1] : nullptr));
     } else if (entry.kind == octree_kind) {
       VOX_CHECK(place("OCTD", only && octree ? &octree_directory_ : nullptr));
     } else if (entry.kind == masks_kind) {
@@ -102,10 +108,12 @@ Status Store::check_geometry(const Container& container, const Params& params) c
   if (leaves_ == none) return bad("no chunk LEAF");
   if (table[leaves_].length % sizeof(uint64_t) != 0 || table[leaves_].length == 0)
     return bad(fmt::format("chunk LEAF has {} bytes: expected a multiple of 8", table[leaves_].length));
+  const bool symmetric = params.geometry == Geometry::ssvdag;
   for (size_t h = 0; h < nodes_.size(); ++h) {
-    if (nodes_[h] == none) return bad(fmt::format("no chunk NODE {}", h + leaf_height + 1));
+    if (nodes_[h] == none)
+      return bad(fmt::format("no chunk {} {}", symmetric ? "SNOD" : "NODE", h + leaf_height + 1));
     const uint64_t length = table[nodes_[h]].length;
-    if (length % sizeof(uint32_t) != 0)
+    if (!symmetric && length % sizeof(uint32_t) != 0)
       return bad(
           fmt::format("chunk NODE {} has {} bytes: expected a multiple of 4", h + leaf_height + 1, length));
   }
@@ -156,10 +164,17 @@ Result<DagView> Store::view_of_chunks(const Container& container, const Params& 
   VOX_TRY(const auto leaves, container.chunk(leaves_));
   view.leaves = reinterpret_cast<const uint64_t*>(leaves.data());
   view.leaf_count = leaves.size() / sizeof(uint64_t);
+  view.symmetric = params.geometry == Geometry::ssvdag;
   for (size_t h = 0; h < nodes_.size(); ++h) {
     VOX_TRY(const auto nodes, container.chunk(nodes_[h]));
-    view.nodes[h + leaf_height + 1] = reinterpret_cast<const uint32_t*>(nodes.data());
-    view.words[h + leaf_height + 1] = nodes.size() / sizeof(uint32_t);
+    const size_t height = h + leaf_height + 1;
+    if (view.symmetric) {
+      view.coded[height] = reinterpret_cast<const uint8_t*>(nodes.data());
+      view.coded_bytes[height] = nodes.size();
+    } else {
+      view.nodes[height] = reinterpret_cast<const uint32_t*>(nodes.data());
+      view.words[height] = nodes.size() / sizeof(uint32_t);
+    }
   }
   return view;
 }

@@ -38,7 +38,7 @@ class BoxWalk {
             const Visit& visit) const {
     if (h == leaf_height) return visit(view_.leaf(pointer), corner, color, state);
     const NodeRef ref = view_.node(h, pointer);
-    if (ref.words == nullptr) return true;
+    if (!ref.there) return true;
     const int64_t side = int64_t{1} << (h - 1);
     const auto& next_state = octant_orders.next[state];
     std::array<ChildRef, 8> children;  // by octant
@@ -50,7 +50,7 @@ class BoxWalk {
         children[octant] = view_.child(ref, h, octant, state);
         continue;
       }
-      children[octant] = {view_.pointer(ref, ref.number(octant)), before};
+      children[octant] = {view_.pointer(ref, octant), before};
       before += view_.colors_below(h - 1, children[octant].pointer);
     }
     for (uint32_t octant = 0; octant < 8; ++octant) {

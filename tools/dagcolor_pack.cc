@@ -78,12 +78,12 @@ void declare(CommandLine& line, Options& o) {
               one_of(o.colors, {"leaf", "all"}));
   line.option("--counts", "WHERE", "node: counts in nodes; pointer: beside pointers, larger, faster (node)",
               one_of(o.counts, {"node", "pointer"}));
-  line.option("--geometry", "HOW",
-              "dag: nodes with pointers, looked up and drawn from the file; octree: masks alone, "
-              "entropy-coded, a fifth to a tenth of that, decoded as a whole before it is drawn; auto: dag, "
-              "or octree "
-              "for storage (auto)",
-              one_of(o.geometry, {"auto", "dag", "octree"}));
+  line.option(
+      "--geometry", "HOW",
+      "dag: nodes with pointers, as published; ssvdag: mirror images once as well, pointers of 2 to 4 "
+      "bytes: a third to two thirds of that; octree: masks alone, entropy-coded: a tenth to a fourth, but "
+      "decoded as a whole before it is drawn; auto: ssvdag, or octree for storage (auto)",
+      one_of(o.geometry, {"auto", "dag", "ssvdag", "octree"}));
   line.option("--for", "WHAT",
               "What the file is made for: access or storage, which sets what is auto (access)",
               one_of(o.purpose, {"access", "storage"}));
@@ -100,6 +100,13 @@ void declare(CommandLine& line, Options& o) {
   declare_input_options(line, o.surface.open);
 }
 
+std::optional<color::Geometry> geometry_of(const Options& o) {
+  if (o.geometry == "dag") return color::Geometry::dag;
+  if (o.geometry == "ssvdag") return color::Geometry::ssvdag;
+  if (o.geometry == "octree" || o.purpose == "storage") return color::Geometry::octree;
+  return {};
+}
+
 color::Options encoder_options(const Options& o) {
   color::Options options = o.encoder;
   options.codec = *color::codec_named(o.codec);
@@ -110,8 +117,7 @@ color::Options encoder_options(const Options& o) {
   options.curve = o.curve == "hilbert" ? color::Curve::hilbert : color::Curve::morton;
   options.space = o.space == "lab" ? color::ErrorSpace::lab : color::ErrorSpace::rgb;
   options.colors = o.colors == "all" ? color::Colors::all : color::Colors::leaf;
-  const bool octree = o.geometry == "octree" || (o.geometry == "auto" && o.purpose == "storage");
-  options.geometry = octree ? color::Geometry::octree : color::Geometry::dag;
+  options.geometry = geometry_of(o);
   options.counts = o.counts == "pointer" ? color::Counts::pointer : color::Counts::node;
   return options;
 }

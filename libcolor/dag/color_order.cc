@@ -35,9 +35,9 @@ class Walk {
       uint64_t first;
     };
     std::array<Child, 8> children;  // by octant
-    for (uint32_t octant = 0, i = 0; octant < 8; ++octant) {
+    for (uint32_t octant = 0; octant < 8; ++octant) {
       if (!ref.has(octant)) continue;
-      children[octant] = {view_.pointer(ref, i++), first};
+      children[octant] = {view_.pointer(ref, octant), first};
       first += view_.colors_below(h - 1, children[octant].pointer);
     }
     Light sum;

@@ -51,6 +51,9 @@ uint32_t UniqueRuns<Word>::add(std::vector<Word>& pool, std::span<const Word> wo
   return place;
 }
 
+template class UniqueRuns<uint32_t>;
+template class UniqueRuns<uint64_t>;
+
 DagPool::DagPool(int height, Colors colors, Counts counts, Curve curve, Context& ctx)
     : unique_nodes_(static_cast<size_t>(height) + 1), reservation_(*ctx.memory) {
   dag_.height = height;

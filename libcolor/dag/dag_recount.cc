@@ -32,7 +32,7 @@ class Recounter {
     for (uint32_t octant = 0; octant < 8; ++octant) {
       if (!ref.has(octant)) continue;
       VOX_TRY(const Subtree child,
-              node(h - 1, view_.pointer(ref, octants.count), octant_orders.next[state][octant]));
+              node(h - 1, view_.pointer(ref, octant), octant_orders.next[state][octant]));
       octants.add(octant, child);
     }
     VOX_TRY(known[pointer], pool_.add_node(h, octants, own));

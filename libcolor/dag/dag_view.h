@@ -9,18 +9,22 @@
 
 #include "formats/hd.h"
 #include "libcolor/dag/dag.h"
+#include "libcolor/dag/symmetric_node.h"
 #include "libcolor/surface/surface.h"
 
 namespace voxkit::color {
 
 /// A node that has been looked up.
 struct NodeRef {
-  const uint32_t* words = nullptr;  ///< null: there is none
-  uint32_t mask = 0;
+  uint32_t mask = 0;  ///< which octants there are
+  bool there = false;
+  const uint32_t* words = nullptr;  ///< of a DAG without symmetry; of one with it:
+  uint32_t codes = 0, mirror = 0;
+  const uint8_t *children = nullptr,
+                *end = nullptr;          ///< what its octants have; the end of its height's bytes
+  const uint8_t* above_words = nullptr;  ///< above leaf words: the height's first byte
 
   VOX_HD bool has(uint32_t octant) const { return mask >> octant & 1; }
-  /// Which of the children an octant is.
-  VOX_HD uint32_t number(uint32_t octant) const { return count_octants(mask & ((1u << octant) - 1)); }
 };
 
 /// A child on the way down.
@@ -39,50 +43,123 @@ struct DagView {
   uint64_t leaf_count = 0;
   std::array<const uint32_t*, most_levels + 1> nodes{};  ///< by height
   std::array<uint64_t, most_levels + 1> words{};
+  // Instead, with symmetry (symmetric_node.h):
+  bool symmetric = false;
+  std::array<const uint8_t*, most_levels + 1> coded{};  ///< by height
+  std::array<uint64_t, most_levels + 1> coded_bytes{};
 
-  /// The leaf word with this number; 0 if there is none.
-  VOX_HD uint64_t leaf(uint32_t pointer) const { return pointer < leaf_count ? leaves[pointer] : 0; }
+  /// The leaf word that a pointer leads to; 0 if there is none.
+  VOX_HD uint64_t leaf(uint32_t pointer) const {
+    return symmetric              ? mirrored_word(stored_word(pointer), pointer >> mirror_shift)
+           : pointer < leaf_count ? leaves[pointer]
+                                  : 0;
+  }
 
-  /// The node of this height, above leaf_height, that begins at a word.
+  /// The node of this height, above leaf_height, that a pointer leads to.
   VOX_HD NodeRef node(int h, uint32_t pointer) const {
     const auto at = static_cast<size_t>(h);
+    if (symmetric) return symmetric_node(h, pointer);
     if (pointer >= words[at]) return {};
     const uint32_t* const first = nodes[at] + pointer;
     const uint32_t mask = *first & 0xff;
     const uint32_t length = node_words(count_octants(mask), *first >> 8 == wide_count, counts);
     if (length > words[at] - pointer) return {};
-    return {first, mask};
+    NodeRef ref;
+    ref.mask = mask;
+    ref.there = true;
+    ref.words = first;
+    return ref;
   }
 
   /// How many colours there are in a subtree of this height.
   VOX_HD uint64_t colors_below(int h, uint32_t pointer) const {
-    if (h == leaf_height) return leaf_colors(leaf(pointer), colors);
+    if (h == leaf_height) return leaf_colors(symmetric ? stored_word(pointer) : leaf(pointer), colors);
     const auto at = static_cast<size_t>(h);
+    if (symmetric) {
+      const uint32_t address = pointer & address_mask;
+      if (coded_bytes[at] < 3 || address > coded_bytes[at] - 3) return 0;
+      return count_at(coded[at] + address + 2, coded[at] + coded_bytes[at]).colors;
+    }
     if (pointer >= words[at]) return 0;
     const uint32_t* const first = nodes[at] + pointer;
     const uint32_t count = *first >> 8;
     if (count != wide_count) return count;
     const NodeRef ref = node(h, pointer);
-    if (ref.words == nullptr) return 0;
+    if (!ref.there) return 0;
     const uint32_t* const wide = first + 1 + count_octants(ref.mask);
     return wide[0] | static_cast<uint64_t>(wide[1]) << 32;
   }
 
-  /// The pointer to a node's child number i, of those that are there.
-  VOX_HD uint32_t pointer(const NodeRef& node, uint32_t i) const {
+  /// The pointer to what an octant that is there has.
+  VOX_HD uint32_t pointer(const NodeRef& node, uint32_t octant) const {
+    if (symmetric) return symmetric_pointer(node, octant);
+    const uint32_t i = count_octants(node.mask & ((1u << octant) - 1));
     return node.words[1 + (counts == Counts::pointer ? 2 * i : i)];
   }
 
   /// The child in an octant that is there, of a node of this height that is gone through in a state.
   ChildRef child(const NodeRef& node, int h, uint32_t octant, OrderState state) const {
-    const uint32_t number = node.number(octant);
-    if (counts == Counts::pointer) return {pointer(node, number), node.words[2 + 2 * number]};
+    if (counts == Counts::pointer)
+      return {pointer(node, octant), node.words[2 + 2 * count_octants(node.mask & ((1u << octant) - 1))]};
     uint64_t before = colors == Colors::all ? 1 : 0;
     for (uint32_t left = node.mask & octant_orders.before[state][octant]; left != 0; left &= left - 1)
-      before +=
-          colors_below(h - 1, pointer(node, node.number(static_cast<uint32_t>(std::countr_zero(left)))));
-    return {pointer(node, number), before};
+      before += colors_below(h - 1, pointer(node, static_cast<uint32_t>(std::countr_zero(left))));
+    return {pointer(node, octant), before};
   }
+
+  /// Where what a node with symmetry has ends, of its stored octants below one; behind `end` if it is cut
+  /// off.
+  VOX_HD static const uint8_t* behind_octants(const NodeRef& node, uint32_t stored) {
+    const uint32_t codes = node.codes & ((1u << 2 * stored) - 1);
+    const uint32_t low = codes & 0x5555, high = codes >> 1 & 0x5555, words = low & high;
+    const uint8_t* at = node.children;
+    if (node.above_words == nullptr || words == 0)
+      return at + 2 * bits(low & ~high) + 3 * bits(high & ~low) + 4 * bits(words);
+    for (uint32_t octant = 0; octant < stored && at < node.end; ++octant) {
+      const uint32_t code = codes >> 2 * octant & 3;
+      at += code == code_other ? 1 + count_octants(*at) : code == 0 ? 0 : code + 1;
+    }
+    return at;
+  }
+
+ private:
+  /// A leaf word as it is stored.
+  VOX_HD uint64_t stored_word(uint32_t pointer) const {
+    const uint32_t address = pointer & address_mask;
+    if ((address & word_in_node) == 0) return address < leaf_count ? leaves[address] : 0;
+    const uint32_t byte = address & ~word_in_node;
+    const uint64_t bytes = coded_bytes[leaf_height + 1];
+    const uint8_t* const first = coded[leaf_height + 1];
+    return byte < bytes ? word_at(first + byte, first + bytes) : 0;
+  }
+  VOX_HD NodeRef symmetric_node(int h, uint32_t pointer) const {
+    const auto at = static_cast<size_t>(h);
+    const uint32_t address = pointer & address_mask;
+    if (coded_bytes[at] < 3 || address > coded_bytes[at] - 3) return {};
+    const uint8_t* const first = coded[at] + address;
+    NodeRef ref;
+    ref.there = true;
+    ref.codes = first[0] | static_cast<uint32_t>(first[1]) << 8;
+    ref.mirror = pointer >> mirror_shift;
+    ref.mask = mirrored_octants(octants_of_codes(ref.codes), ref.mirror);
+    ref.end = coded[at] + coded_bytes[at];
+    ref.children = count_at(first + 2, ref.end).behind;
+    ref.above_words = h == leaf_height + 1 ? coded[at] : nullptr;
+    return ref;
+  }
+  VOX_HD uint32_t symmetric_pointer(const NodeRef& node, uint32_t octant) const {
+    constexpr uint32_t nowhere = ~0u;
+    const uint32_t stored = octant ^ node.mirror, code = node.codes >> 2 * stored & 3;
+    const uint8_t* const at = behind_octants(node, stored);
+    if (code == code_other && node.above_words != nullptr)
+      return node.mirror << mirror_shift | word_in_node | static_cast<uint32_t>(at - node.above_words);
+    if (at > node.end || node.end - at < static_cast<ptrdiff_t>(code + 1)) return nowhere;
+    uint32_t pointer = at[0] | static_cast<uint32_t>(at[1]) << 8;
+    if (code >= code_long) pointer |= static_cast<uint32_t>(at[2]) << 16;
+    if (code == code_other) pointer |= static_cast<uint32_t>(at[3]) << 24;
+    return ((pointer & 7) ^ node.mirror) << mirror_shift | pointer >> 3;
+  }
+  VOX_HD static uint32_t bits(uint32_t codes) { return count_octants(octants_of_codes(codes)); }
 };
 
 /// A DAG in memory, as a view of it.
@@ -136,7 +213,7 @@ class CellFinder {
       const Step at = path_[static_cast<size_t>(h)];
       const auto octant = static_cast<uint32_t>(place >> 3 * (h - 1) & 7);
       const NodeRef node = view_.node(h, at.pointer);
-      if (node.words == nullptr) return {};
+      if (!node.there) return {};
       if (h == height) return {true, at.color};
       if (!node.has(octant)) return {};
       const ChildRef child = view_.child(node, h, octant, at.state);

@@ -49,7 +49,7 @@ class VoidSearch {
     if (--budget_ < 0) return false;
     if (h == leaf_height) return is_void_leaf(view_.leaf(pointer), corner);
     const NodeRef node = view_.node(h, pointer);
-    if (node.words == nullptr) return false;
+    if (!node.there) return false;
     // Octants that the box reaches into, as a mask.
     constexpr uint32_t upper[3] = {0xaa, 0xcc, 0xf0};
     uint32_t octants = node.mask;
@@ -63,7 +63,7 @@ class VoidSearch {
       const auto octant = static_cast<uint32_t>(std::countr_zero(octants));
       Corner at = corner;
       for (size_t a = 0; a < 3; ++a) at[a] += (octant >> a & 1) * half;
-      if (!is_void(h - 1, view_.pointer(node, node.number(octant)), at)) return false;
+      if (!is_void(h - 1, view_.pointer(node, octant), at)) return false;
     }
     return true;
   }

@@ -51,7 +51,8 @@ Result<Octree> octree_of(const Dag& dag, Reservation& memory) {
     next.reserve(next_count);
     for (const uint32_t pointer : nodes) {
       const NodeRef node = view.node(h, pointer);
-      for (uint32_t i = 0; i < count_octants(node.mask); ++i) next.push_back(view.pointer(node, i));
+      for (uint32_t octant = 0; octant < 8; ++octant)
+        if (node.has(octant)) next.push_back(view.pointer(node, octant));
     }
     levels.push_back(level_of(masks));
     nodes = std::move(next);

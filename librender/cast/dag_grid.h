@@ -20,6 +20,7 @@ struct DagCastView {
    public:
     VOX_HD_HOT explicit Cursor(const DagCastView& volume) : dag_(*volume.dag), lowest_(dag_.height) {
       pointer(dag_.height) = dag_.root;
+      if (dag_.height == color::leaf_height) leaf_ = dag_.leaf(dag_.root);
     }
     /// The value of a cell that is not void is its height, opaque. `finest`: cells of edge 2^finest are fine
     /// enough, where nodes have colours.
@@ -40,11 +41,12 @@ struct DagCastView {
         const int s = h - 1;
         const uint32_t octant = (x >> s & 1) | (y >> s & 1) << 1 | (z >> s & 1) << 2;
         ++nodes_;
-        if (node.words == nullptr || !node.has(octant)) return {{}, s};
-        pointer(s) = dag_.pointer(node, node.number(octant));
+        if (!node.there || !node.has(octant)) return {{}, s};
+        pointer(s) = dag_.pointer(node, octant);
       }
+      if (lowest_ != color::leaf_height) leaf_ = dag_.leaf(pointer(color::leaf_height));
       lowest_ = color::leaf_height;
-      const uint64_t leaf = dag_.leaf(pointer(color::leaf_height));
+      const uint64_t leaf = leaf_;
       if (finest >= color::leaf_height && leaf != 0)
         return {opaque_cell(color::leaf_height), color::leaf_height};
       const uint32_t octant = (x >> 1 & 1) | (y & 2) | (z & 2) << 1;
@@ -70,6 +72,7 @@ struct DagCastView {
         pointers_[search == Search::path ? color::most_levels + 1 : 1];  ///< by height, down to `lowest_`
     uint32_t x_ = 0, y_ = 0, z_ = 0;
     int lowest_;
+    uint64_t leaf_ = 0;  ///< the word, where `lowest_` is its height
     uint32_t nodes_ = 0;
   };
   VOX_HD_HOT Cursor cursor() const { return Cursor(*this); }

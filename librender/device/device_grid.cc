@@ -108,6 +108,9 @@ class Dag final : public Grid {
       VOX_TRY(auto nodes, backend().upload(std::span(dag->nodes[h], dag->words[h]), "nodes", ctx));
       view.nodes[h] = nodes.data();
       nodes_.push_back(std::move(nodes));
+      VOX_TRY(auto coded, backend().upload(std::span(dag->coded[h], dag->coded_bytes[h]), "nodes", ctx));
+      view.coded[h] = coded.data();
+      coded_.push_back(std::move(coded));
     }
     VOX_TRY(view_, backend().upload(std::span<const color::DagView>(&view, 1), "a view", ctx));
     return {};
@@ -126,6 +129,7 @@ class Dag final : public Grid {
   DagGrid grid_;
   DeviceArray<uint64_t> leaves_;
   std::vector<DeviceArray<uint32_t>> nodes_;
+  std::vector<DeviceArray<uint8_t>> coded_;
   DeviceArray<color::DagView> view_;
 };
 

@@ -3,12 +3,17 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <array>
 
 #include "libcolor/part_codecs.h"
 
 namespace voxkit::cli {
 std::string_view name(color::ImageCurve curve) {
   return curve == color::ImageCurve::morton ? "morton" : "hilbert";
+}
+std::string_view name(color::Geometry geometry) {
+  constexpr std::array<std::string_view, 3> names = {"dag", "ssvdag", "octree"};
+  return names[static_cast<size_t>(geometry)];
 }
 std::string_view name(color::Curve curve) {
   return curve == color::Curve::morton ? "morton" : "hilbert";
@@ -32,7 +37,7 @@ Json params_json(const color::Params& p) {
   json.set("curve", name(p.curve));
   json.set("colors", p.colors == color::Colors::leaf ? "leaf" : "all");
   json.set("counts", p.counts == color::Counts::node ? "node" : "pointer");
-  json.set("geometry", p.geometry == color::Geometry::dag ? "dag" : "octree");
+  json.set("geometry", name(p.geometry));
   return json;
 }
 

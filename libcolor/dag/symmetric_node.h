@@ -1,0 +1,93 @@
+// Nodes of a DAG in which subtrees that are mirror images of each other are stored once, as well as equal
+// ones. Source: A. J. Villanueva, F. Marton, E. Gobbetti, "SSVDAGs: Symmetry-aware Sparse Voxel DAGs", I3D
+// 2016; counts of colours, leaves within nodes and sizes of pointers are ours. File: formats/FORMAT.md,
+// section 4.10.
+//
+// A pointer leads to a subtree that is to be mirrored along some axes: x, y and z are bits 0 to 2 of
+// `mirror`. In memory it is 32 bits, the mirror on top; in a node
+//
+//   2 bytes       for each octant two bits, its code: 0: nothing is in it; 1, 2: a pointer of 2 or of 3
+//   bytes;
+//                 3: one of 4 bytes, or above leaf words the word itself
+//   1 to 10 bytes how many colours there are below, 7 bits a byte, the lowest first; bit 7: more follow
+//   then          what each octant has, in order
+//
+// A pointer has the mirror in its lowest three bits; above it is the number of a leaf word, or of the first
+// byte of a node among those of its height. A word in a node is a byte that says which octants of it hold
+// voxels, and a byte for each of these.
+#pragma once
+
+#include <cstdint>
+
+#include "formats/hd.h"
+
+namespace voxkit::color {
+
+inline constexpr uint32_t mirror_shift = 29, address_mask = (1u << mirror_shift) - 1;
+/// Of the address of a leaf word: it is in a node, at a byte of those of the height above.
+inline constexpr uint32_t word_in_node = 1u << 28;
+/// Codes of octants.
+inline constexpr uint32_t code_short = 1, code_long = 2, code_other = 3;
+
+/// A mask of octants, mirrored.
+VOX_HD constexpr uint32_t mirrored_octants(uint32_t mask, uint32_t mirror) {
+  if ((mirror & 1) != 0) mask = (mask >> 1 & 0x55) | (mask & 0x55) << 1;
+  if ((mirror & 2) != 0) mask = (mask >> 2 & 0x33) | (mask & 0x33) << 2;
+  if ((mirror & 4) != 0) mask = mask >> 4 | (mask & 0x0f) << 4;
+  return mask;
+}
+/// A leaf word, mirrored: both bits of each coordinate of its voxels change.
+VOX_HD constexpr uint64_t mirrored_word(uint64_t word, uint32_t mirror) {
+  const auto exchange = [&](uint64_t low, int by) { word = (word >> by & low) | (word & low) << by; };
+  if ((mirror & 1) != 0) {
+    exchange(0x5555555555555555u, 1);
+    exchange(0x00ff00ff00ff00ffu, 8);
+  }
+  if ((mirror & 2) != 0) {
+    exchange(0x3333333333333333u, 2);
+    exchange(0x0000ffff0000ffffu, 16);
+  }
+  if ((mirror & 4) != 0) {
+    exchange(0x0f0f0f0f0f0f0f0fu, 4);
+    exchange(0x00000000ffffffffu, 32);
+  }
+  return word;
+}
+
+/// Octants whose code is not 0.
+VOX_HD constexpr uint32_t octants_of_codes(uint32_t codes) {
+  uint32_t mask = (codes | codes >> 1) & 0x5555;
+  mask = (mask | mask >> 1) & 0x3333;
+  mask = (mask | mask >> 2) & 0x0f0f;
+  return (mask | mask >> 4) & 0xff;
+}
+
+/// The word that begins at a byte of a node; 0 where it does not end before `end`.
+VOX_HD inline uint64_t word_at(const uint8_t* at, const uint8_t* end) {
+  if (at >= end) return 0;
+  uint64_t word = 0;
+  const uint32_t mask = *at++;
+  for (int octant = 0; octant < 8; ++octant) {
+    if ((mask >> octant & 1) == 0) continue;
+    if (at == end) return 0;
+    word |= static_cast<uint64_t>(*at++) << 8 * octant;
+  }
+  return word;
+}
+
+/// A number of colours; where there are more than ten bytes of it, or it is cut off, it means nothing.
+struct NodeCount {
+  uint64_t colors = 0;
+  const uint8_t* behind = nullptr;
+};
+VOX_HD inline NodeCount count_at(const uint8_t* at, const uint8_t* end) {
+  uint64_t colors = 0;
+  for (int shift = 0; at < end && shift < 64; shift += 7) {
+    const uint8_t byte = *at++;
+    colors |= static_cast<uint64_t>(byte & 0x7f) << shift;
+    if (byte < 0x80) break;
+  }
+  return {colors, at};
+}
+
+}  // namespace voxkit::color
