@@ -60,10 +60,15 @@ std::string encoded(const std::string& key, int threads) {
   const std::map<std::string, ColorCodec> codecs{{"raw", ColorCodec::raw}, {"fws", ColorCodec::fws},
                                                  {"vws", ColorCodec::vws}, {"bc1", ColorCodec::bc1},
                                                  {"bc7", ColorCodec::bc7}, {"palette", ColorCodec::palette}};
-  // "vws-lab": with a threshold in CIELAB.
+  // "vws-lab": with a threshold in CIELAB; "raw-octree": the way geometry is stored, else as a DAG.
   const auto codec = split(fields[1], '-');
   options.codec = codecs.at(codec[0]);
-  if (codec.size() > 1) options.space = ErrorSpace::lab;
+  options.geometry = Geometry::dag;
+  for (const std::string& word : codec) {
+    if (word == "lab") options.space = ErrorSpace::lab;
+    if (word == "ssvdag") options.geometry = Geometry::ssvdag;
+    if (word == "octree") options.geometry = Geometry::octree;
+  }
   options.threshold = std::stod(fields[2]);
   options.effort = std::stoi(fields[3]);
   options.palette = 100;  // fewer than the scenes have

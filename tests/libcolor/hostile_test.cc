@@ -32,7 +32,10 @@ const std::vector<Bytes>& files() {
           if (colors == Colors::all) options.threshold = 3;
           if ((counts == Counts::pointer) == (codec == ColorCodec::raw || codec == ColorCodec::vws))
             options.curve = Curve::hilbert;
-          if ((counts == Counts::pointer) == (colors == Colors::leaf)) options.geometry = Geometry::octree;
+          if ((counts == Counts::pointer) == (colors == Colors::leaf))
+            options.geometry = Geometry::octree;
+          else if (codec == ColorCodec::vws)
+            options.geometry = Geometry::dag;
           if (counts == Counts::pointer) {
             options.image_curve = ImageCurve::hilbert;
             options.quality = 40;
@@ -99,30 +102,39 @@ TEST(ColorHostile, CountsThatDoNotAddUpAreFoundWithoutACheck) {
   Options options;
   options.codec = ColorCodec::raw;
   ListSource shell(sphere_shell(5), Index3(32));
-  const Bytes whole = compressed(shell, options);
-  const auto table = voxkit::test::table_of(whole);
+  Bytes whole;
   int changed = 0;
-  for (size_t i = 0; i < table.entries; ++i) {
-    const std::byte* const entry = &whole[table.offset + 64 * i];
-    if (load_le<uint32_t>(entry) != chunk_kind("NODE")) continue;
-    const auto offset = load_le<uint64_t>(entry + 16);
-    if (load_le<uint64_t>(entry + 24) == 0) continue;
-    Bytes file = whole;
-    const auto word = load_le<uint32_t>(&file[offset]);
-    store_le(&file[offset], word - (1u << 8));  // the first node's count, less one
-    voxkit::test::reseal(file);
-    ++changed;
-    const auto container = Container::open(file, "test", nullptr);
-    ASSERT_TRUE(container);
-    const auto volume = Volume::open(*container);
-    ASSERT_TRUE(volume);
-    EXPECT_FALSE((*volume)->check(ctx));
-    const auto walked =
-        (*volume)->for_each_voxel([](std::span<const SurfaceVoxel>) -> Status { return {}; }, ctx);
-    ASSERT_FALSE(walked) << "chunk " << i;
-    EXPECT_EQ(walked.error().code, ErrorCode::input);
+  for (const bool symmetric : {true, false}) {
+    options.geometry = symmetric ? Geometry::ssvdag : Geometry::dag;
+    whole = compressed(shell, options);
+    const auto table = voxkit::test::table_of(whole);
+    for (size_t i = 0; i < table.entries; ++i) {
+      const std::byte* const entry = &whole[table.offset + 64 * i];
+      if (load_le<uint32_t>(entry) != chunk_kind(symmetric ? "SNOD" : "NODE")) continue;
+      const auto offset = load_le<uint64_t>(entry + 16);
+      if (load_le<uint64_t>(entry + 24) == 0) continue;
+      Bytes file = whole;
+      if (symmetric) {
+        file[offset + 2] ^= std::byte{1};  // the first node's count: its lowest bits
+      } else {
+        const auto word = load_le<uint32_t>(&file[offset]);
+        store_le(&file[offset], word - (1u << 8));  // the same, less one
+      }
+      voxkit::test::reseal(file);
+      ++changed;
+      const auto container = Container::open(file, "test", nullptr);
+      ASSERT_TRUE(container);
+      const auto volume = Volume::open(*container);
+      ASSERT_TRUE(volume);
+      EXPECT_FALSE((*volume)->check(ctx));
+      const auto walked =
+          (*volume)->for_each_voxel([](std::span<const SurfaceVoxel>) -> Status { return {}; }, ctx);
+      ASSERT_FALSE(walked) << "chunk " << i;
+      EXPECT_EQ(walked.error().code, ErrorCode::input);
+    }
   }
-  EXPECT_GE(changed, 2);
+  EXPECT_GE(changed, 4);
+  const auto table = voxkit::test::table_of(whole);
   // The number of all colors that the parameters say: not that of the root, it is no volume to walk.
   for (const uint64_t more : {uint64_t{1}, ~uint64_t{0}, uint64_t{1} << 36}) {
     Bytes file = whole;
