@@ -25,6 +25,8 @@ struct NodeRef {
   const uint8_t* above_words = nullptr;  ///< above leaf words: the height's first byte
 
   VOX_HD bool has(uint32_t octant) const { return mask >> octant & 1; }
+  /// Octants that have a word in the node, by the lower bits of their codes.
+  VOX_HD uint32_t words_of_codes() const { return above_words != nullptr ? codes & codes >> 1 & 0x5555 : 0; }
 };
 
 /// A child on the way down.
@@ -76,9 +78,8 @@ struct DagView {
     if (h == leaf_height) return leaf_colors(symmetric ? stored_word(pointer) : leaf(pointer), colors);
     const auto at = static_cast<size_t>(h);
     if (symmetric) {
-      const uint32_t address = pointer & address_mask;
-      if (coded_bytes[at] < 3 || address > coded_bytes[at] - 3) return 0;
-      return count_at(coded[at] + address + 2, coded[at] + coded_bytes[at]).colors;
+      const NodeRef ref = symmetric_node(h, pointer);
+      return ref.there ? count_at(behind_octants(ref), ref.end).colors : 0;
     }
     if (pointer >= words[at]) return 0;
     const uint32_t* const first = nodes[at] + pointer;
@@ -107,19 +108,9 @@ struct DagView {
     return {pointer(node, octant), before};
   }
 
-  /// Where what a node with symmetry has ends, of its stored octants below one; behind `end` if it is cut
-  /// off.
-  VOX_HD static const uint8_t* behind_octants(const NodeRef& node, uint32_t stored) {
-    const uint32_t codes = node.codes & ((1u << 2 * stored) - 1);
-    const uint32_t low = codes & 0x5555, high = codes >> 1 & 0x5555, words = low & high;
-    const uint8_t* at = node.children;
-    if (node.above_words == nullptr || words == 0)
-      return at + 2 * bits(low & ~high) + 3 * bits(high & ~low) + 4 * bits(words);
-    for (uint32_t octant = 0; octant < stored && at < node.end; ++octant) {
-      const uint32_t code = codes >> 2 * octant & 3;
-      at += code == code_other ? 1 + count_octants(*at) : code == 0 ? 0 : code + 1;
-    }
-    return at;
+  /// Where the octants of a node with symmetry end; not before `end` if it is cut off.
+  VOX_HD static const uint8_t* behind_octants(const NodeRef& node) {
+    return behind_words(node, node.words_of_codes());
   }
 
  private:
@@ -143,23 +134,36 @@ struct DagView {
     ref.mirror = pointer >> mirror_shift;
     ref.mask = mirrored_octants(octants_of_codes(ref.codes), ref.mirror);
     ref.end = coded[at] + coded_bytes[at];
-    ref.children = count_at(first + 2, ref.end).behind;
+    ref.children = first + 2;
     ref.above_words = h == leaf_height + 1 ? coded[at] : nullptr;
     return ref;
   }
   VOX_HD uint32_t symmetric_pointer(const NodeRef& node, uint32_t octant) const {
     constexpr uint32_t nowhere = ~0u;
     const uint32_t stored = octant ^ node.mirror, code = node.codes >> 2 * stored & 3;
-    const uint8_t* const at = behind_octants(node, stored);
+    const uint32_t in_node = node.words_of_codes(), before = (1u << 2 * stored) - 1;
     if (code == code_other && node.above_words != nullptr)
-      return node.mirror << mirror_shift | word_in_node | static_cast<uint32_t>(at - node.above_words);
+      return node.mirror << mirror_shift | word_in_node |
+             static_cast<uint32_t>(behind_words(node, in_node & before) - node.above_words);
+    const uint8_t* const at = node.children + pointer_bytes_of(node.codes & ~(3 * in_node) & before);
     if (at > node.end || node.end - at < static_cast<ptrdiff_t>(code + 1)) return nowhere;
-    uint32_t pointer = at[0] | static_cast<uint32_t>(at[1]) << 8;
-    if (code >= code_long) pointer |= static_cast<uint32_t>(at[2]) << 16;
-    if (code == code_other) pointer |= static_cast<uint32_t>(at[3]) << 24;
+    uint32_t pointer;
+    if (node.end - at >= 4) {  // in one load
+      pointer = at[0] | static_cast<uint32_t>(at[1]) << 8 | static_cast<uint32_t>(at[2]) << 16 |
+                static_cast<uint32_t>(at[3]) << 24;
+      pointer &= ~0u >> (24 - 8 * code);
+    } else {
+      pointer = at[0] | static_cast<uint32_t>(at[1]) << 8;
+      if (code == code_long) pointer |= static_cast<uint32_t>(at[2]) << 16;
+    }
     return ((pointer & 7) ^ node.mirror) << mirror_shift | pointer >> 3;
   }
-  VOX_HD static uint32_t bits(uint32_t codes) { return count_octants(octants_of_codes(codes)); }
+  /// Where these words of a node end, its first ones.
+  VOX_HD static const uint8_t* behind_words(const NodeRef& node, uint32_t in_node) {
+    const uint8_t* at = node.children + pointer_bytes_of(node.codes & ~(3 * node.words_of_codes()));
+    for (; in_node != 0 && at < node.end; in_node &= in_node - 1) at += 1 + count_octants(*at);
+    return at;
+  }
 };
 
 /// A DAG in memory, as a view of it.

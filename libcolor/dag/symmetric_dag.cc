@@ -219,31 +219,34 @@ class Builder {
       Class& own = level(h).classes[i];
       own.address = static_cast<uint32_t>(bytes.size());
       bytes.resize(bytes.size() + 2);
+      uint32_t codes = 0;
+      std::vector<uint8_t> words;
+      for_each_child(h, i, [&](uint32_t octant, uint32_t number, uint32_t mirror) {
+        codes |= write_child(bytes, words, h, number, mirror) << 2 * octant;
+      });
+      bytes.insert(bytes.end(), words.begin(), words.end());
       uint64_t left = own.colors;
       for (; left >= 0x80; left >>= 7) bytes.push_back(static_cast<uint8_t>(left | 0x80));
       bytes.push_back(static_cast<uint8_t>(left));
-      uint32_t codes = 0;
-      for_each_child(h, i, [&](uint32_t octant, uint32_t number, uint32_t mirror) {
-        codes |= write_child(bytes, h, number, mirror) << 2 * octant;
-      });
       bytes[own.address] = static_cast<uint8_t>(codes);
       bytes[own.address + 1] = static_cast<uint8_t>(codes >> 8);
     }
     return memory_.add(bytes.size(), "a DAG with symmetry");
   }
   /// Appends a pointer, or a word; its code.
-  uint32_t write_child(std::vector<uint8_t>& bytes, int h, uint32_t number, uint32_t mirror) {
+  uint32_t write_child(std::vector<uint8_t>& pointers, std::vector<uint8_t>& words, int h, uint32_t number,
+                       uint32_t mirror) {
     const Class& child = level(h - 1).classes[number];
     if (h == leaf_height + 1 && child.address == word_in_node) {
       const uint64_t word = mirrored_word(words_[number], mirror);
-      bytes.push_back(static_cast<uint8_t>(leaf_octants(word)));
+      words.push_back(static_cast<uint8_t>(leaf_octants(word)));
       for (int octant = 0; octant < 8; ++octant)
-        if (const auto mask = static_cast<uint8_t>(word >> 8 * octant); mask != 0) bytes.push_back(mask);
+        if (const auto mask = static_cast<uint8_t>(word >> 8 * octant); mask != 0) words.push_back(mask);
       return code_other;
     }
     const uint32_t length = pointer_bytes(child.address);
     const uint32_t pointer = child.address << 3 | mirror;
-    for (uint32_t i = 0; i < length; ++i) bytes.push_back(static_cast<uint8_t>(pointer >> 8 * i));
+    for (uint32_t i = 0; i < length; ++i) pointers.push_back(static_cast<uint8_t>(pointer >> 8 * i));
     return length - 1;
   }
 

@@ -9,17 +9,20 @@
 //   2 bytes       for each octant two bits, its code: 0: nothing is in it; 1, 2: a pointer of 2 or of 3
 //   bytes;
 //                 3: one of 4 bytes, or above leaf words the word itself
+//   then          the pointers of octants, in order, and then the words
 //   1 to 10 bytes how many colours there are below, 7 bits a byte, the lowest first; bit 7: more follow
-//   then          what each octant has, in order
 //
 // A pointer has the mirror in its lowest three bits; above it is the number of a leaf word, or of the first
 // byte of a node among those of its height. A word in a node is a byte that says which octants of it hold
 // voxels, and a byte for each of these.
 #pragma once
 
+#include <bit>
+#include <cstddef>
 #include <cstdint>
 
 #include "formats/hd.h"
+#include "libcolor/dag/dag.h"
 
 namespace voxkit::color {
 
@@ -29,29 +32,37 @@ inline constexpr uint32_t word_in_node = 1u << 28;
 /// Codes of octants.
 inline constexpr uint32_t code_short = 1, code_long = 2, code_other = 3;
 
+/// Exchanges the bits of `low` with those that many places above them, if asked to; without a branch, as it
+/// is as good as chance.
+template <class Word>
+VOX_HD constexpr Word exchanged(Word word, Word low, int by, uint32_t whether) {
+  const Word apart = (word >> by ^ word) & low & (Word{0} - Word{whether});
+  return word ^ apart ^ apart << by;
+}
 /// A mask of octants, mirrored.
 VOX_HD constexpr uint32_t mirrored_octants(uint32_t mask, uint32_t mirror) {
-  if ((mirror & 1) != 0) mask = (mask >> 1 & 0x55) | (mask & 0x55) << 1;
-  if ((mirror & 2) != 0) mask = (mask >> 2 & 0x33) | (mask & 0x33) << 2;
-  if ((mirror & 4) != 0) mask = mask >> 4 | (mask & 0x0f) << 4;
-  return mask;
+  mask = exchanged(mask, 0x55u, 1, mirror & 1);
+  mask = exchanged(mask, 0x33u, 2, mirror >> 1 & 1);
+  return exchanged(mask, 0x0fu, 4, mirror >> 2 & 1);
 }
 /// A leaf word, mirrored: both bits of each coordinate of its voxels change.
 VOX_HD constexpr uint64_t mirrored_word(uint64_t word, uint32_t mirror) {
-  const auto exchange = [&](uint64_t low, int by) { word = (word >> by & low) | (word & low) << by; };
-  if ((mirror & 1) != 0) {
-    exchange(0x5555555555555555u, 1);
-    exchange(0x00ff00ff00ff00ffu, 8);
-  }
-  if ((mirror & 2) != 0) {
-    exchange(0x3333333333333333u, 2);
-    exchange(0x0000ffff0000ffffu, 16);
-  }
-  if ((mirror & 4) != 0) {
-    exchange(0x0f0f0f0f0f0f0f0fu, 4);
-    exchange(0x00000000ffffffffu, 32);
-  }
-  return word;
+  word = exchanged(word, uint64_t{0x5555555555555555u}, 1, mirror & 1);
+  word = exchanged(word, uint64_t{0x00ff00ff00ff00ffu}, 8, mirror & 1);
+  word = exchanged(word, uint64_t{0x3333333333333333u}, 2, mirror >> 1 & 1);
+  word = exchanged(word, uint64_t{0x0000ffff0000ffffu}, 16, mirror >> 1 & 1);
+  word = exchanged(word, uint64_t{0x0f0f0f0f0f0f0f0fu}, 4, mirror >> 2 & 1);
+  return exchanged(word, uint64_t{0x00000000ffffffffu}, 32, mirror >> 2 & 1);
+}
+
+/// What pointers of these codes take in bytes: one more than its code each, where it is not 0.
+VOX_HD constexpr uint32_t pointer_bytes_of(uint32_t codes) {
+  const auto sum = [](uint32_t pairs) {  // of eight numbers of two bits
+    pairs = (pairs & 0x3333) + (pairs >> 2 & 0x3333);
+    pairs = (pairs & 0x0f0f) + (pairs >> 4 & 0x0f0f);
+    return (pairs + (pairs >> 8)) & 0xff;
+  };
+  return sum(codes) + sum((codes | codes >> 1) & 0x5555);
 }
 
 /// Octants whose code is not 0.
@@ -66,12 +77,9 @@ VOX_HD constexpr uint32_t octants_of_codes(uint32_t codes) {
 VOX_HD inline uint64_t word_at(const uint8_t* at, const uint8_t* end) {
   if (at >= end) return 0;
   uint64_t word = 0;
-  const uint32_t mask = *at++;
-  for (int octant = 0; octant < 8; ++octant) {
-    if ((mask >> octant & 1) == 0) continue;
-    if (at == end) return 0;
-    word |= static_cast<uint64_t>(*at++) << 8 * octant;
-  }
+  uint32_t mask = *at++;
+  if (end - at < static_cast<ptrdiff_t>(count_octants(mask))) return 0;
+  for (; mask != 0; mask &= mask - 1) word |= static_cast<uint64_t>(*at++) << 8 * std::countr_zero(mask);
   return word;
 }
 
