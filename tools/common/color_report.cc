@@ -54,7 +54,10 @@ double color_percent(const color::Params& p) {
 
 std::string sizes_text(const color::Params& p) {
   std::string text = fmt::format(
-      "surface     {} voxels, {} nodes, {} bytes ({:.4g} bits a voxel)\n", p.leaf_voxels, p.dag_nodes,
+      "surface     {} voxels, {} nodes of {}, {} bytes ({:.4g} bits a voxel)\n", p.leaf_voxels, p.dag_nodes,
+      p.geometry == color::Geometry::octree   ? "an octree"
+      : p.geometry == color::Geometry::ssvdag ? "a DAG with symmetry"
+                                              : "a DAG",
       p.dag_bytes,
       8 * static_cast<double>(p.dag_bytes) / static_cast<double>(std::max<uint64_t>(p.leaf_voxels, 1)));
   text += fmt::format("colors      {}, {} of {}, {} bytes ({:.4g} % of 24 bits), error {:.4g} a channel\n",
