@@ -14,10 +14,12 @@ import struct
 import sys
 
 from container import Container, Refused, Volume, require
+from octree_decode import Octree
 from png_decode import read_png
 
 SURFACE = 3
 CODECS = {1: "raw", 2: "fws", 3: "vws", 4: "bc1", 5: "astc", 6: "bc7", 7: "palette", 8: "jpeg", 9: "jp2", 10: "png"}
+GEOMETRIES = {0: "dag", 2: "octree"}
 VOXELS, ALL = 1, 2
 IN_NODES, BESIDE = 1, 2
 WIDE = (1 << 24) - 1
@@ -72,6 +74,9 @@ class Surface:
             height += 1
         require(self.height == height, "chunk DAGP: byte 4: height {}, expected {}", self.height, height)
         require(self.voxels <= self.count <= self.voxels * (height + 1), "chunk DAGP: {} colours", self.count)
+        self.geometry = self.container.unpack("<B", at + 91)[0]
+        require(self.geometry in GEOMETRIES, "chunk DAGP: byte 91: {}", self.geometry)
+        require(GEOMETRIES[self.geometry] == "dag" or self.root == 0, "chunk DAGP: byte 24: {}", self.root)
 
     def words(self, kind, index, letter, size):
         found = [c for c in self.container.chunks.values() if c.kind == kind and c.index == index]
@@ -80,21 +85,35 @@ class Surface:
         require(chunk.length % size == 0, "chunk {} {}: {} bytes", kind.decode(), index, chunk.length)
         return self.container.unpack("<%d%s" % (chunk.length // size, letter), chunk.offset)
 
-    # Sections 4.2 and 4.3
+    # Sections 4.2 and 4.3, or 4.9
     def read_nodes(self):
+        self.octree = None
+        if GEOMETRIES[self.geometry] == "octree":
+            self.octree = Octree(self.container, self.height, self.voxels)
+            return
+        require(not any(c.kind in (b"OCTD", b"MASK") for c in self.container.chunks.values()), "chunks OCTD and MASK: beside a DAG")
         self.leaves = self.words(b"LEAF", 0, "Q", 8)
         self.nodes = {h: self.words(b"NODE", h, "I", 4) for h in range(3, self.height + 1)}
         indices = [c.index for c in self.container.chunks.values() if c.kind == b"NODE"]
         require(sorted(indices) == list(range(3, self.height + 1)), "chunks NODE: indices {}", sorted(indices))
 
     def children(self, h, pointer):
-        """(octant, pointer) of all octants of a node that have voxels."""
+        """(octant, pointer) of all octants of a node that have voxels. The pointer to a node of an octree is its number."""
+        if self.octree:
+            return self.octree.children(h, pointer)
         words = self.nodes[h]
         require(pointer < len(words), "chunk NODE {}: no word {}", h, pointer)
         octants = [o for o in range(8) if words[pointer] >> o & 1]
         stride = 2 if self.counts == BESIDE else 1
         require(pointer + 1 + stride * len(octants) <= len(words), "chunk NODE {}: a node ends behind it", h)
         return [(o, words[pointer + 1 + stride * i]) for i, o in enumerate(octants)]
+
+    def word(self, pointer):
+        """A cell of height 2."""
+        if self.octree:
+            return self.octree.word(pointer)
+        require(pointer < len(self.leaves), "chunk LEAF: no word {}", pointer)
+        return self.leaves[pointer]
 
     # Section 4.4
     def walk(self):
@@ -107,8 +126,7 @@ class Surface:
         def cell(h, pointer, x, y, z, way):
             nonlocal number
             if h == 2:
-                require(pointer < len(self.leaves), "chunk LEAF: no word {}", pointer)
-                yield from inside(2, self.leaves[pointer], x, y, z, way)
+                yield from inside(2, self.word(pointer), x, y, z, way)
                 return
             if self.has_color == ALL:
                 number += 1
@@ -132,8 +150,10 @@ class Surface:
                 yield from inside(h - 1, bits >> octant * width & (1 << width) - 1, x + half * (octant & 1),
                                   y + half * (octant >> 1 & 1), z + half * (octant >> 2), next_way)
 
+        if self.voxels and self.octree:
+            self.octree.read_masks()
         if self.voxels:
-            yield from cell(self.height, self.root, 0, 0, 0, 0)
+            yield from cell(self.height, 0 if self.octree else self.root, 0, 0, 0, 0)
         self.counted = number
 
     # Section 4.5
@@ -292,7 +312,7 @@ def decode(surface):
 
 def info(surface):
     return {"dims": surface.volume.dims, "codec": CODECS[surface.codec], "colors": surface.has_color,
-            "counts": surface.counts, "endpoints": surface.endpoints, "height": surface.height,
+            "counts": surface.counts, "endpoints": surface.endpoints, "height": surface.height, "geometry": GEOMETRIES[surface.geometry],
             "leaf_voxels": surface.voxels, "color_count": surface.count, "threshold": surface.threshold}
 
 

@@ -85,6 +85,19 @@ class Fields:
         return state.to_bytes(max((state.bit_length() + 7) // 8, 0 if words else least + 1), "little") + words
 
 
+def decisions(taken, least):
+    """A page of such, as section 5.3 has it backwards: of each the parts of 2048 of the first of two, and whether it is that.
+    Without words it has `least` bytes or more."""
+    state, words = 1, b""
+    for q, first_of_two in reversed(taken):
+        part, first = (q, 0) if first_of_two else (2048 - q, q)
+        if state << 11 >= part << 64:
+            words += struct.pack("<I", state & 0xffffffff)
+            state >>= 32
+        state = (state // part << 11) + state % part + first
+    return state.to_bytes(max((state.bit_length() + 7) // 8, 0 if words else least), "little") + words
+
+
 class MaskFields:
     """A mask model, of which some contexts have other `numbers` than 0. Version 2 has parents."""
 
@@ -101,16 +114,8 @@ class MaskFields:
         return out.bytes()
 
     def page(self, solid):
-        """A mask page, as section 5.3 has it backwards: of each voxel that may be solid its context, and if it is."""
-        state, words = 1, b""
-        for context, is_solid in reversed(solid):
-            q = DECISIONS[self.numbers.get(context, 0)]
-            part, first = (q, 0) if is_solid else (2048 - q, q)
-            if state << 11 >= part << 64:
-                words += struct.pack("<I", state & 0xffffffff)
-                state >>= 32
-            state = (state // part << 11) + state % part + first
-        return state.to_bytes(max((state.bit_length() + 7) // 8, 0 if words else 2), "little") + words
+        """A mask page: of each voxel that may be solid its context, and if it is."""
+        return decisions([(DECISIONS[self.numbers.get(context, 0)], is_solid) for context, is_solid in solid], 2)
 
 
 # ---- Contents --------------------------------------------------------------------------------------------------------

@@ -66,8 +66,9 @@ class SmallFile(unittest.TestCase):
 # ---- With tools ------------------------------------------------------------------------------------------------------
 
 
-@unittest.skipUnless(BIN, "VOXKIT_BIN is not set")
-class Tools(ToolCase):
+class SurfaceCase(ToolCase):
+    """Compresses, and compares what both decoders make of it."""
+
     def encode(self, source, *options):
         self.run_program(os.path.join(BIN, "dagcolor-pack"), source, "-f", "-o", self.path("x.dagc"), *options)
         return self.path("x.dagc")
@@ -83,6 +84,9 @@ class Tools(ToolCase):
             self.assertEqual(info[key], said[key])
         return info
 
+
+@unittest.skipUnless(BIN, "VOXKIT_BIN is not set")
+class Tools(SurfaceCase):
     def test_built_ins(self):
         for options in (("--codec", "raw"), ("--codec", "fws"), ("--codec", "vws"), ("--codec", "bc1"),
                         ("--codec", "palette"), ("--codec", "palette", "--palette", "3", "--colors", "all"),
