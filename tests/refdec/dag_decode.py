@@ -16,10 +16,11 @@ import sys
 from container import Container, Refused, Volume, require
 from octree_decode import Octree
 from png_decode import read_png
+from symmetric_decode import SymmetricNodes
 
 SURFACE = 3
 CODECS = {1: "raw", 2: "fws", 3: "vws", 4: "bc1", 5: "astc", 6: "bc7", 7: "palette", 8: "jpeg", 9: "jp2", 10: "png"}
-GEOMETRIES = {0: "dag", 2: "octree"}
+GEOMETRIES = {0: "dag", 1: "ssvdag", 2: "octree"}
 VOXELS, ALL = 1, 2
 IN_NODES, BESIDE = 1, 2
 WIDE = (1 << 24) - 1
@@ -76,7 +77,8 @@ class Surface:
         require(self.voxels <= self.count <= self.voxels * (height + 1), "chunk DAGP: {} colours", self.count)
         self.geometry = self.container.unpack("<B", at + 91)[0]
         require(self.geometry in GEOMETRIES, "chunk DAGP: byte 91: {}", self.geometry)
-        require(GEOMETRIES[self.geometry] == "dag" or self.root == 0, "chunk DAGP: byte 24: {}", self.root)
+        require(GEOMETRIES[self.geometry] != "octree" or self.root == 0, "chunk DAGP: byte 24: {}", self.root)
+        require(GEOMETRIES[self.geometry] != "ssvdag" or self.counts == IN_NODES, "chunk DAGP: byte 2: {}", self.counts)
 
     def words(self, kind, index, letter, size):
         found = [c for c in self.container.chunks.values() if c.kind == kind and c.index == index]
@@ -85,22 +87,30 @@ class Surface:
         require(chunk.length % size == 0, "chunk {} {}: {} bytes", kind.decode(), index, chunk.length)
         return self.container.unpack("<%d%s" % (chunk.length // size, letter), chunk.offset)
 
-    # Sections 4.2 and 4.3, or 4.9
+    # Sections 4.2 and 4.3, 4.9 or 4.10
     def read_nodes(self):
-        self.octree = None
+        """`other` has children() and word() of a geometry that is not that of sections 4.2 and 4.3."""
+        self.other = None
         if GEOMETRIES[self.geometry] == "octree":
-            self.octree = Octree(self.container, self.height, self.voxels)
+            self.other, self.root = Octree(self.container, self.height, self.voxels), 0
             return
-        require(not any(c.kind in (b"OCTD", b"MASK") for c in self.container.chunks.values()), "chunks OCTD and MASK: beside a DAG")
+        symmetric = GEOMETRIES[self.geometry] == "ssvdag"
+        kind, not_here = (b"SNOD", b"NODE") if symmetric else (b"NODE", b"SNOD")
+        require(not any(c.kind in (b"OCTD", b"MASK", not_here) for c in self.container.chunks.values()),
+                "chunks OCTD, MASK and {}: beside a DAG with {}", not_here.decode(), kind.decode())
         self.leaves = self.words(b"LEAF", 0, "Q", 8)
-        self.nodes = {h: self.words(b"NODE", h, "I", 4) for h in range(3, self.height + 1)}
-        indices = [c.index for c in self.container.chunks.values() if c.kind == b"NODE"]
-        require(sorted(indices) == list(range(3, self.height + 1)), "chunks NODE: indices {}", sorted(indices))
+        self.nodes = {h: self.words(kind, h, "B" if symmetric else "I", 1 if symmetric else 4) for h in range(3, self.height + 1)}
+        indices = [c.index for c in self.container.chunks.values() if c.kind == kind]
+        require(sorted(indices) == list(range(3, self.height + 1)), "chunks {}: indices {}", kind.decode(), sorted(indices))
+        if symmetric:
+            require(len(self.leaves) <= 1 << 28, "chunk LEAF: {} words", len(self.leaves))
+            self.other = SymmetricNodes(self.leaves, {h: bytes(nodes) for h, nodes in self.nodes.items()}, self.height)
+            self.root = self.root & (1 << 29) - 1, self.root >> 29
 
     def children(self, h, pointer):
-        """(octant, pointer) of all octants of a node that have voxels. The pointer to a node of an octree is its number."""
-        if self.octree:
-            return self.octree.children(h, pointer)
+        """(octant, pointer) of all octants of a node that have voxels."""
+        if self.other:
+            return self.other.children(h, pointer)
         words = self.nodes[h]
         require(pointer < len(words), "chunk NODE {}: no word {}", h, pointer)
         octants = [o for o in range(8) if words[pointer] >> o & 1]
@@ -110,8 +120,8 @@ class Surface:
 
     def word(self, pointer):
         """A cell of height 2."""
-        if self.octree:
-            return self.octree.word(pointer)
+        if self.other:
+            return self.other.word(pointer)
         require(pointer < len(self.leaves), "chunk LEAF: no word {}", pointer)
         return self.leaves[pointer]
 
@@ -150,10 +160,10 @@ class Surface:
                 yield from inside(h - 1, bits >> octant * width & (1 << width) - 1, x + half * (octant & 1),
                                   y + half * (octant >> 1 & 1), z + half * (octant >> 2), next_way)
 
-        if self.voxels and self.octree:
-            self.octree.read_masks()
+        if self.voxels and GEOMETRIES[self.geometry] == "octree":
+            self.other.read_masks()
         if self.voxels:
-            yield from cell(self.height, 0 if self.octree else self.root, 0, 0, 0, 0)
+            yield from cell(self.height, self.root, 0, 0, 0, 0)
         self.counted = number
 
     # Section 4.5

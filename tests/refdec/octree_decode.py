@@ -73,7 +73,7 @@ class Octree:
     def __init__(self, container, height, voxels):
         self.container, self.height = container, height
         kinds = [c.kind for c in container.chunks.values()]
-        require(b"LEAF" not in kinds and b"NODE" not in kinds, "chunks LEAF and NODE: in a file with an octree")
+        require(not {b"LEAF", b"NODE", b"SNOD"} & set(kinds), "chunks LEAF, NODE and SNOD: in a file with an octree")
         directory = container.only(b"OCTD")
         self.chunks = sorted((c for c in container.chunks.values() if c.kind == b"MASK"), key=lambda c: c.part)
         require([(c.index, c.part) for c in self.chunks] == [(0, i) for i in range(len(self.chunks))], "chunks MASK: not their parts")

@@ -95,6 +95,7 @@ class Tools(SurfaceCase):
                         ("--codec", "raw", "--zstd", "3"),
                         ("-e", "4", "--space", "lab"), ("-e", "25.5", "--effort", "1"),
                         ("--colors", "all"), ("--counts", "pointer"), ("--colors", "all", "--counts", "pointer"),
+                        ("--geometry", "dag"), ("--geometry", "dag", "--colors", "all", "--curve", "hilbert"),
                         ("--curve", "hilbert"), ("--curve", "hilbert", "--counts", "pointer", "--colors", "all")):
             with self.subTest(options=options):
                 self.compare(self.encode("menger:3", *options))

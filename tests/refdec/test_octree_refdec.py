@@ -135,14 +135,15 @@ class SmallFile(unittest.TestCase):
         def voxels(count, last):
             return lambda: (self.voxels(count), page(2, last, b"\1")())
 
-        yield made("byte 91", put("dagp", 91, 1))
+        yield made("OCTD, MASK", put("dagp", 91, 1))
         yield made("byte 91", put("dagp", 91, 3))
-        yield made("OCTD and MASK", put("dagp", 91, 0))
-        yield made("OCTD and MASK", put("dagp", 91, 0), OCTD=None, LEAF=bytes(8), NODE3=b"")
-        yield made("OCTD and MASK", put("dagp", 91, 0), MASK=None, LEAF=bytes(8), NODE3=b"")
+        yield made("OCTD, MASK", put("dagp", 91, 0))
+        yield made("OCTD, MASK", put("dagp", 91, 0), OCTD=None, LEAF=bytes(8), NODE3=b"")
+        yield made("OCTD, MASK", put("dagp", 91, 0), MASK=None, LEAF=bytes(8), NODE3=b"")
         yield made("byte 24", put("dagp", 24, 1))
-        yield made("LEAF and NODE", LEAF=bytes(8))
-        yield made("LEAF and NODE", NODE3=b"")
+        yield made("LEAF, NODE", LEAF=bytes(8))
+        yield made("LEAF, NODE", NODE3=b"")
+        yield made("LEAF, NODE", SNOD3=b"")
         yield made("OCTD", OCTD=None)
         yield made("OCTD", OCTD1=b"")
         yield made("OCTD", OCTD01=b"")
@@ -267,7 +268,7 @@ class Tools(SurfaceCase):
                 data[at:at + 4] = bytes((x, y, z, 255))
         file = self.encode_raw(data, dims, "--codec", "raw")
         self.compare(file)
-        self.assertGreater(len(Surface(Container(read(file))).octree.pages[1]), 1)
+        self.assertGreater(len(Surface(Container(read(file))).other.pages[1]), 1)
         self.assertEqual(read(self.path("tool-good.raw")), bytes(data))
 
     def test_several_chunks(self):
@@ -278,7 +279,7 @@ class Tools(SurfaceCase):
         file = self.encode_raw(data, dims, "--codec", "palette")
         self.compare(file)
         self.assertEqual(read(self.path("tool-good.raw")), data)
-        octree = Surface(Container(read(file))).octree
+        octree = Surface(Container(read(file))).other
         self.assertGreater(min(len(octree.chunks), len(octree.pages[2])), 1)
 
     def test_files_of_no_writer(self):
