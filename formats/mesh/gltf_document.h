@@ -4,7 +4,6 @@
 
 #include <array>
 #include <cstdint>
-#include <glm/mat3x3.hpp>
 #include <glm/vec3.hpp>
 #include <map>
 #include <optional>
@@ -15,6 +14,7 @@
 #include "formats/context.h"
 #include "formats/mesh/mesh.h"
 #include "formats/mesh/mesh_module.h"
+#include "formats/mesh/placement.h"
 
 namespace voxkit::gltf {
 
@@ -103,15 +103,6 @@ struct Mesh {
   std::vector<double> weights;
 };
 
-/// p goes to linear * p + shift.
-struct Placement {
-  glm::dmat3 linear{1};
-  glm::dvec3 shift{0};
-  Placement operator*(const Placement& inner) const {
-    return {linear * inner.linear, linear * inner.shift + shift};
-  }
-  glm::dvec3 operator()(const glm::dvec3& p) const { return linear * p + shift; }
-};
 /// Of a translation, a rotation as a quaternion x, y, z, w of any length, and a scale.
 Placement placement_of(const glm::dvec3& translation, const std::array<double, 4>& rotation,
                        const glm::dvec3& scale);

@@ -2,12 +2,9 @@
 
 #include <algorithm>
 #include <cmath>
-#include <vector>
 
-#include "formats/context.h"
-#include "formats/mapped_file.h"
 #include "formats/mesh/ply_file.h"
-#include "formats/mesh/point_cloud.h"
+#include "formats/mesh/point_runs.h"
 
 namespace voxkit {
 namespace {
@@ -65,59 +62,42 @@ class PlyPointCloud final : public PointCloud {
     const PointFields fields(element);
     const bool lists = std::any_of(element.properties.begin(), element.properties.end(),
                                    [](const Property& p) { return p.list; });
+    const CloudPoint blank = fields.blank();
+    ReadBytes before(bytes);
     if (header_.ascii || lists)
-      return in_runs(sink, [&](uint64_t, CloudPoint& point) -> Result<size_t> {
-        for (const Property& property : element.properties) {
-          if (property.role == Role::none) {
-            VOX_CHECK(numbers.pass(property));
-            continue;
-          }
-          VOX_TRY(const double value, numbers.next(property.type));
-          fields.set(property, value, point);
-        }
-        return numbers.at();
-      });
+      return read_in_runs(
+          size_, blank, sink,
+          [&](uint64_t, CloudPoint& point) -> Result<bool> {
+            for (const Property& property : element.properties) {
+              if (property.role == Role::none) {
+                VOX_CHECK(numbers.pass(property));
+                continue;
+              }
+              VOX_TRY(const double value, numbers.next(property.type));
+              fields.set(property, value, point);
+            }
+            return true;
+          },
+          [&](uint64_t) { before.release(numbers.at()); });
     // All points take as many bytes, and these were counted.
     size_t stride = 0;
     for (const Property& property : element.properties) stride += bytes_of(property.type);
     const size_t first = numbers.at();
-    return in_runs(sink, [&](uint64_t i, CloudPoint& point) -> Result<size_t> {
-      const std::byte* at = bytes.data() + first + i * stride;
-      for (const Property& property : element.properties) {
-        if (property.role != Role::none)
-          fields.set(property, load(at, property.type, header_.big_endian), point);
-        at += bytes_of(property.type);
-      }
-      return first + (i + 1) * stride;
-    });
+    return read_in_runs(
+        size_, blank, sink,
+        [&](uint64_t i, CloudPoint& point) -> Result<bool> {
+          const std::byte* at = bytes.data() + first + i * stride;
+          for (const Property& property : element.properties) {
+            if (property.role != Role::none)
+              fields.set(property, load(at, property.type, header_.big_endian), point);
+            at += bytes_of(property.type);
+          }
+          return true;
+        },
+        [&](uint64_t i) { before.release(first + i * stride); });
   }
 
  private:
-  /// `next(i, point)` reads a point and says which byte of the file it ends before.
-  template <class Next>
-  Status in_runs(const Sink& sink, const Next& next) const {
-    constexpr uint64_t most = 1 << 14;
-    const CloudPoint blank = PointFields(header_.elements[vertices_]).blank();
-    std::vector<CloudPoint> run;
-    run.reserve(most);
-    size_t released = 0, end = 0;
-    for (uint64_t i = 0; i < size_; ++i) {
-      CloudPoint& point = run.emplace_back(blank);
-      VOX_TRY(end, next(i, point));
-      bool there = point.alpha >= 128;
-      for (int a = 0; a < 3; ++a)
-        if (constexpr double large = 3.5e38; !(std::abs(point.at[a]) <= large)) there = false;
-      if (!there) run.pop_back();
-      if (run.size() < most && i + 1 < size_) continue;
-      VOX_CHECK(check_interrupt());
-      VOX_CHECK(sink(run));
-      run.clear();
-      release_bytes(file_->bytes().subspan(released, end - released));
-      released = end;
-    }
-    return {};
-  }
-
   std::shared_ptr<const MappedFile> file_;
   Header header_;
   size_t vertices_;  ///< which element they are
