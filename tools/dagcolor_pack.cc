@@ -26,7 +26,8 @@ struct Options {
 
 void declare(CommandLine& line, Options& o) {
   line.argument("INPUT",
-                "Mesh (.obj .gltf .glb .ply), points (.ply), model (.vox), RGBA or RGB volume, built-in "
+                "Mesh (.obj .gltf .glb .ply .stl .3ds), points (.ply .pcd .las), model (.vox), RGBA or RGB "
+                "volume, built-in "
                 "(menger:5, terrain:N, terrain:N:box), or .dagc file",
                 o.input);
   line.file("-o,--output", "OUT", "Output (.dagc), or -", o.output, true);

@@ -8,9 +8,11 @@
 #include <utility>
 
 #include "formats/mesh/gltf_scene.h"
+#include "formats/mesh/mesh_3ds.h"
 #include "formats/mesh/mesh_obj.h"
 #include "formats/mesh/mesh_parts.h"
 #include "formats/mesh/mesh_ply.h"
+#include "formats/mesh/mesh_stl.h"
 #include "formats/names.h"
 
 namespace voxkit {
@@ -39,6 +41,8 @@ void bring_into_range(glm::vec4& color) {
 Result<MeshParts> read_parts(const std::string& path, MeshFolder& folder, Context& ctx) {
   if (has_ending(path, ".ply")) return read_ply(path, ctx);
   if (has_ending(path, ".obj")) return read_obj(path, folder, ctx);
+  if (has_ending(path, ".stl")) return read_stl(path, ctx);
+  if (has_ending(path, ".3ds")) return read_3ds(path, ctx);
   return read_gltf(path, folder, ctx);
 }
 
@@ -62,7 +66,7 @@ Status check_points(Mesh& mesh, const std::string& path) {
 }  // namespace
 
 bool is_mesh_name(const std::string& name) {
-  for (const char* ending : {".obj", ".gltf", ".glb", ".ply"})
+  for (const char* ending : {".obj", ".gltf", ".glb", ".ply", ".stl", ".3ds"})
     if (has_ending(name, ending)) return true;
   return false;
 }
@@ -188,7 +192,8 @@ Status load_pictures(MeshParts& parts, const std::string& path, MeshFolder& fold
 }
 
 Result<Mesh> read_mesh(const std::string& path, Context& ctx, const MeshOptions& options) {
-  if (!is_mesh_name(path)) return bad_input(path, "not a mesh: expected .obj, .gltf, .glb or .ply");
+  if (!is_mesh_name(path))
+    return bad_input(path, "not a mesh: expected .obj, .gltf, .glb, .ply, .stl or .3ds");
   MeshFolder folder(path, options.allow_outside);
   VOX_TRY(MeshParts parts, read_parts(path, folder, ctx));
   VOX_CHECK(check_mesh(parts.mesh, path));

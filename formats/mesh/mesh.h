@@ -1,4 +1,4 @@
-// Triangle meshes with colours: what is read from .obj, .gltf, .glb and .ply files.
+// Triangle meshes with colours: what is read from .obj, .gltf, .glb, .ply, .stl and .3ds files.
 #pragma once
 
 #include <array>
@@ -72,7 +72,7 @@ struct Mesh {
   std::vector<Reservation> memory;
 };
 
-/// Whether a name ends like a mesh: .obj, .gltf, .glb or .ply.
+/// Whether a name ends like a mesh: .obj, .gltf, .glb, .ply, .stl or .3ds.
 bool is_mesh_name(const std::string& name);
 
 /// What a user allows a mesh to do.
@@ -81,8 +81,8 @@ struct MeshOptions {
 };
 
 /// Reads a mesh: the triangles and points of all nodes of the scene in their places, polygons split, lines
-/// left out, triangles without area dropped. Colours of .obj and .ply files are taken as sRGB, those of glTF
-/// as linear light, as their specifications or usual writers have it. Materials of .obj whose picture or
+/// left out, triangles without area dropped. Colours are taken as sRGB, those of glTF as
+/// linear light, as their specifications or usual writers have it. Materials of .obj whose picture or
 /// opacity map has alpha are masks with a cut-off of 0.5.
 ///
 /// A .ply file without faces is no mesh but points (point_cloud.h): ErrorCode::input.

@@ -24,7 +24,7 @@ struct CloudPoint {
 class PointCloud {
  public:
   virtual ~PointCloud() = default;
-  /// As many as there are in the file.
+  /// As many as there are in the file, without those that it marks as withheld.
   uint64_t size() const { return size_; }
   /// What of the file is left out, a sentence each.
   const std::vector<std::string>& notes() const { return notes_; }
@@ -39,9 +39,31 @@ class PointCloud {
   std::vector<std::string> notes_;
 };
 
+/// Whether a name ends like points: .ply (which may be a mesh, too), .pcd, .las or .laz.
+bool is_points_name(const std::string& name);
+
+/// Opens the points of a file by its ending. Null of a .ply file with faces, which is a mesh. Errors: those
+/// of the functions below.
+Result<std::unique_ptr<const PointCloud>> open_points(const std::string& path);
+
 /// The points of a .ply file: its vertices, which have x, y and z, and red, green and blue or no colours:
 /// then they are white. Null of a file with faces, which is a mesh. ErrorCode::input: no such file, or it is
 /// damaged as far as its header says.
 Result<std::unique_ptr<const PointCloud>> open_ply_points(const std::string& path);
+
+/// The points of a .pcd file of the Point Cloud Library, version 0.7 or older ("The PCD file format"): ASCII,
+/// binary and binary_compressed, which is unpacked into a file in $TMPDIR (default /tmp). Places are x, y and
+/// z as they are stored: the viewpoint is not applied, as in PCL. Colours are those of rgb, or of rgba with
+/// its alpha, unless that is 0 everywhere; without either, intensity is grey, from 0, or the least where that
+/// is below, to the greatest; else points are white. ErrorCode::input: no such file, or it is damaged as far
+/// as its header says; ErrorCode::output: no room to unpack it.
+Result<std::unique_ptr<const PointCloud>> open_pcd_points(const std::string& path);
+
+/// The points of a .las file, version 1.0 to 1.4 (ASPRS, "LAS specification 1.4-R15"), of any format, not
+/// compressed. Places are scaled and shifted in doubles, in the file's coordinate reference system. Of
+/// colours of 16 bits the upper 8 count; where none is above 255 they are of 8. Where there are none, or all
+/// are 0, intensity is grey, from 0 to the greatest. Points that are withheld are left out. ErrorCode::input:
+/// no such file, it is compressed (LAZ), or it is damaged.
+Result<std::unique_ptr<const PointCloud>> open_las_points(const std::string& path);
 
 }  // namespace voxkit

@@ -20,8 +20,8 @@ Surface voxelise(const std::string& name, const SurfaceOptions& options, Context
   voxelise.kind = options.kind;
   voxelise.emission = options.emission;
   if (options.resolution) voxelise.resolution = *options.resolution;
-  if (has_ending(name, ".ply")) {
-    VOX_TRY(auto points, open_ply_points(name));
+  if (is_points_name(name)) {
+    VOX_TRY(auto points, open_points(name));
     if (points) return color::surface_of_points(std::move(points), voxelise.resolution, ctx);
   }
   VOX_TRY(Mesh mesh, read_mesh(name, ctx, {.allow_outside = options.open.allow_outside}));
@@ -31,7 +31,7 @@ Surface voxelise(const std::string& name, const SurfaceOptions& options, Context
 Surface open_any(const std::string& name, const SurfaceOptions& options, Context& ctx) {
   if (options.frame && !has_ending(name, ".vox"))
     return fail(ErrorCode::usage, name, "--frame: is no animated model: expected a .vox file");
-  if (is_mesh_name(name)) return voxelise(name, options, ctx);
+  if (is_mesh_name(name) || is_points_name(name)) return voxelise(name, options, ctx);
   if (options.resolution)
     return fail(ErrorCode::usage, name, "--resolution: has voxels already: expected a mesh");
   if (color::is_terrain(name)) return color::open_terrain(name);
@@ -40,7 +40,7 @@ Surface open_any(const std::string& name, const SurfaceOptions& options, Context
     return color::surface_of(std::move(scene), ctx);
   }
   OpenOptions open = options.open;
-  open.other_kinds += "meshes (.obj .gltf .glb .ply), models (.vox), ";
+  open.other_kinds += "meshes (.obj .gltf .glb .ply .stl .3ds), points (.ply .pcd .las), models (.vox), ";
   VOX_TRY(Input input, open_input(name, open, ctx));
   return color::surface_of(std::move(input.source));
 }

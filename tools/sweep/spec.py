@@ -78,7 +78,7 @@ class Spec:
 
 def is_surface(file):
     """Whether it has no voxels until dagcolor-pack has made them."""
-    return file.endswith((".obj", ".gltf", ".glb", ".ply", ".vox")) or file.startswith("terrain:")
+    return file.endswith((".obj", ".gltf", ".glb", ".ply", ".stl", ".3ds", ".pcd", ".las", ".vox")) or file.startswith("terrain:")
 
 
 class Place:
