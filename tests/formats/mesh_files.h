@@ -95,4 +95,26 @@ inline std::string ply_triangle(bool binary) {
   return text + "\x03" + bytes_of(std::vector<int32_t>{0, 1, 2});
 }
 
+/// A triangle of a binary STL file: its corners, and the two bytes behind it.
+struct StlTriangle {
+  std::vector<float> corners{0, 0, 0, 1, 0, 0, 0, 1, 0};
+  uint16_t attribute = 0;
+};
+inline std::string stl_binary(std::string head, const std::vector<StlTriangle>& triangles) {
+  head.resize(80, ' ');
+  head += bytes_of(std::vector<uint32_t>{static_cast<uint32_t>(triangles.size())});
+  for (const StlTriangle& t : triangles)
+    head += bytes_of(std::vector<float>{0, 0, 1}) + bytes_of(t.corners) +
+            bytes_of(std::vector<uint16_t>{t.attribute});
+  return head;
+}
+inline std::string stl_ascii() {
+  return "solid a square\n"
+         "  facet normal 0 0 1\n    outer loop\n      vertex 0 0 0\n      vertex 1 0 0\n"
+         "      vertex 1 1e0 0\n    endloop\n  endfacet\n"
+         "  FACET NORMAL 0 0 1\n    OUTER LOOP\n      VERTEX 0 0 0\n      VERTEX +1. 1 0\n"
+         "      VERTEX 0 1 -0.0\n    ENDLOOP\n  ENDFACET\n"
+         "endsolid a square\n";
+}
+
 }  // namespace voxkit

@@ -315,7 +315,7 @@ TEST_F(MeshFileTest, WhatIsMissingIsNamed) {
   expect_error("a.obj", obj_square("mtllib lost.mtl\nusemtl a\n"), "lost.mtl is missing");
   GltfSquare file;
   expect_error("a.gltf", file.json("lost.bin"), "lost.bin is missing");
-  expect_error("a.xyz", "", "expected .obj, .gltf, .glb or .ply");
+  expect_error("a.xyz", "", "expected .obj, .gltf, .glb, .ply, .stl or .3ds");
   const auto none = read_mesh(path("none.obj"), ctx_);
   ASSERT_FALSE(none);
   EXPECT_EQ(none.error().code, ErrorCode::input);

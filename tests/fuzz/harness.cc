@@ -273,10 +273,9 @@ Verdict read_dicom(Input input) {
       [&](Context& ctx) { return open_dicom(std::filesystem::path(path).parent_path().string(), {}, ctx); });
 }
 
-/// A mesh, or points.
-Verdict read_mesh_ply(Input input) {
-  const std::string path = put(input, "in.ply");
-  const auto points = open_ply_points(path);
+/// Points, or a mesh where it is one.
+Verdict read_points_file(const std::string& path) {
+  const auto points = open_points(path);
   if (!points) return judge(points.error());
   if (!*points) return read_mesh_file(path);
   uint64_t found = 0, come = 0;
@@ -287,6 +286,23 @@ Verdict read_mesh_ply(Input input) {
   });
   if (!status) return judge(status.error());
   return found == come && come <= (*points)->size() ? Verdict{true, {}} : fault("points that are not there");
+}
+
+Verdict read_mesh_ply(Input input) {
+  return read_points_file(put(input, "in.ply"));
+}
+Verdict read_points_pcd(Input input) {
+  return read_points_file(put(input, "in.pcd"));
+}
+Verdict read_points_las(Input input) {
+  return read_points_file(put(input, "in.las"));
+}
+
+Verdict read_mesh_stl(Input input) {
+  return read_mesh_file(put(input, "in.stl"));
+}
+Verdict read_mesh_3ds(Input input) {
+  return read_mesh_file(put(input, "in.3ds"));
 }
 
 Verdict read_mesh_gltf(Input input) {
@@ -312,6 +328,10 @@ const std::vector<Reader>& readers() {
       {"mesh_ply", nullptr, read_mesh_ply, mesh_ply_seeds},
       {"mesh_gltf", nullptr, read_mesh_gltf, mesh_gltf_seeds},
       {"mesh_obj", nullptr, read_mesh_obj, mesh_obj_seeds},
+      {"mesh_stl", nullptr, read_mesh_stl, mesh_stl_seeds},
+      {"mesh_3ds", nullptr, read_mesh_3ds, mesh_3ds_seeds},
+      {"points_pcd", nullptr, read_points_pcd, points_pcd_seeds},
+      {"points_las", nullptr, read_points_las, points_las_seeds},
       {"jpeg", "jpeg", read_jpeg, jpeg_seeds},
       {"jp2", "jp2", read_jp2, jp2_seeds},
       {"png", "png", read_png, png_seeds},

@@ -35,10 +35,15 @@ Verdict read_image(Input input);
 Verdict read_openvdb(Input input);
 /// A folder of one slice.
 Verdict read_dicom(Input input);
+/// A mesh, or points.
 Verdict read_mesh_ply(Input input);
 /// GLB where it starts so.
 Verdict read_mesh_gltf(Input input);
 Verdict read_mesh_obj(Input input);
+Verdict read_mesh_stl(Input input);
+Verdict read_mesh_3ds(Input input);
+Verdict read_points_pcd(Input input);
+Verdict read_points_las(Input input);
 /// Images in memory: the first two bytes are their width and height.
 Verdict read_jpeg(Input input);
 Verdict read_jp2(Input input);

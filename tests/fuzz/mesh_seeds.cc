@@ -1,6 +1,8 @@
-// Small meshes.
+// Small meshes, and points.
 #include "tests/formats/gltf_file.h"
 #include "tests/formats/mesh_files.h"
+#include "tests/formats/point_files.h"
+#include "tests/formats/studio_file.h"
 #include "tests/fuzz/seeds.h"
 
 namespace voxkit::fuzz {
@@ -99,6 +101,65 @@ std::vector<std::string> mesh_gltf_seeds() {
 std::vector<std::string> mesh_obj_seeds() {
   return {obj_square(), obj_square("o a\ng b\ns 1\nvn 0 0 1\n") + "usemtl x\nf 1//1 -2//1 3//1\nl 1 2\np 1\n",
           "f 1 2 \\\n3 4 5\nv .5 0 0 1 0 .5\nv 2 1. 0\nv 0 2e0 0\nv 1 1 0 .25\nv +1 -0.5 0\n"};
+}
+
+std::vector<std::string> mesh_stl_seeds() {
+  const std::vector<StlTriangle> colored{{{0, 0, 0, 1, 0, 0, 0, 1, 0}, 0x8421},
+                                         {{0, 0, 0, 1, 0, 0, 0, 0, 1}, 0x1234}};
+  return {stl_ascii(), stl_binary("solid by hand", colored),
+          stl_binary(std::string("COLOR=\1\2\3\xff,MATERIAL=") + "123412341234", colored)};
+}
+
+std::vector<std::string> mesh_3ds_seeds() {
+  using namespace studio_file;
+  Object object;
+  object.axes = {0, 1, 0, -1, 0, 0, 0, 0, 1, 10, 0, 0};
+  object.groups = group("a", {0}) + group("b", {1});
+  const std::string scene =
+      material("a", chunk(0xa020, color_24(255, 9, 0) + chunk(0x0012, "abc")) +
+                        chunk(0xa050, chunk(0x0030, u16(9)))) +
+      material("b", chunk(0xa020, chunk(0x0010, floats({0, 0.5f, 1}))) +
+                        chunk(0xa200, chunk(0x0031, floats({0})) + chunk(0xa351, u16(2)) +
+                                          chunk(0xa354, floats({2})))) +
+      object.chunks() + chunk(0x4000, text("lamp") + chunk(0x4600, floats({1, 2, 3})));
+  Node parent, child;
+  parent.object = "$$$DUMMY";
+  parent.turn = {1, 0, 1, 0};
+  child.id = 1;
+  child.parent = 0;
+  child.pivot = {1, 2, 3};
+  child.keys = 2;
+  return {file(scene), file(scene, child.chunks() + parent.chunks() + Node{.id = 2}.chunks())};
+}
+
+std::vector<std::string> points_pcd_seeds() {
+  const PcdFile colors{"x y z rgba _", "4 8 2 4 1", "F F I U U", "1 1 1 1 3"};
+  const PcdFile gray{"x y z intensity", "4 4 4 4", "F F F F", "1 1 1 1"};
+  const std::string numbers = bytes_of(std::vector<float>{1, 2, 3, 4, 5, 6, 7, 8});
+  return {PcdFile{}.ascii("1 2 3\n4.5 -5e1 nan\n"),
+          gray.ascii("1 2 3 4\n5 6 7 -8\n"),
+          colors.binary(std::string(42, '@')),
+          gray.binary(numbers),
+          gray.compressed(lzf_literals(numbers), 32),
+          gray.compressed("\x03" + numbers.substr(0, 4) + std::string("\xe0\x13\x03", 3), 32)};
+}
+
+std::vector<std::string> points_las_seeds() {
+  LasFile old, colored, new_one;
+  old.format = 1;
+  old.minor = 1;
+  old.points = {{{1, 2, 3}, {}, 100, 0x80}, {{4, 5, 6}, {}, 200, 2}};
+  colored.format = 3;
+  colored.records = LasFile::record("LASF_Projection", 34735, bytes_of(std::vector<uint16_t>(12, 1)));
+  colored.record_count = 1;
+  colored.points = {{{1, 2, 3}, {255, 0, 1}}, {{4, 5, -6}, {2, 3, 4}}};
+  new_one.format = 7;
+  new_one.minor = 4;
+  new_one.extra = 2;
+  new_one.points = {{{1, 2, 3}, {65535, 0, 256}}};
+  new_one.tail = LasFile::record("LASF_Projection", 2112, "PROJCS[\"a\"]", true);
+  new_one.tail_count = 1;
+  return {old.text(), colored.text(), new_one.text()};
 }
 
 }  // namespace voxkit::fuzz
