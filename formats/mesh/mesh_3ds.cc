@@ -47,6 +47,7 @@ class Reader {
       if (chunk.id == kfdata) VOX_CHECK(read_nodes(chunk.body));
     }
     VOX_CHECK(add_objects());
+    if (file.left() > 0) dropped_.insert(fmt::format("{} bytes behind the file's own", file.left()));
     if (has_keys_) dropped_.insert("key frames after the first");
     for (const std::string& name : unknown_)
       builder_.note(fmt::format("material {} is not in the file: white is taken", name));
@@ -202,6 +203,7 @@ class Reader {
   Status sort_faces(const Object& object) {
     const size_t count = object.faces.size() / 8, vertices = object.places.size() / 12;
     order_.clear();
+    made_.resize(std::max(made_.size(), vertices));
     for (uint32_t face = 0; face < count; ++face) {
       const auto [a, b, c] = corners_of(object, face);
       if (const uint32_t last = std::max({a, b, c}); last >= vertices)
@@ -305,7 +307,7 @@ class Reader {
     uint32_t vertex = none, way = 0;
   };
   std::vector<uint32_t> order_, material_;
-  std::vector<Made> made_ = std::vector<Made>(1 << 16);
+  std::vector<Made> made_;
 };
 
 }  // namespace

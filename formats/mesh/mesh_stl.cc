@@ -112,7 +112,7 @@ class AsciiStl {
 class BinaryStl {
  public:
   BinaryStl(std::span<const std::byte> bytes, const std::string& path, Context& ctx)
-      : bytes_(bytes), path_(path), builder_(path, ctx), material_of_(1 << 15, none) {}
+      : bytes_(bytes), path_(path), builder_(path, ctx) {}
 
   Result<MeshParts> read() {
     const uint64_t count = load_le<uint32_t>(&bytes_[80]),
@@ -175,6 +175,7 @@ class BinaryStl {
     const bool colored = ((attribute & 0x8000) != 0) == marks_;
     colored_ += colored;
     odd_ += !colored && !is_filling(attribute);
+    if (colored && material_of_.empty()) material_of_.resize(1 << 15, none);
     uint32_t& known = colored ? material_of_[bits] : without_;
     if (known != none) return known;
     MeshMaterial material;

@@ -198,12 +198,12 @@ TEST_F(StudioTest, WhatIsDroppedIsNamed) {
       material("m", chunk(0xa030, color_24(1, 1, 1)) + chunk(0xa080, "") +
                         chunk(0xa230, chunk(0xa300, text("bumps.tga"))) + chunk(0xa33a, "")) +
       object.chunks();
-  const Mesh mesh = read("a.3ds", file(scene));
+  const Mesh mesh = read("a.3ds", file(scene) + "more");
   ASSERT_EQ(mesh.notes.size(), 1u);
-  EXPECT_EQ(
-      mesh.notes[0],
-      "dropped: bump maps, cameras, highlights, lights, second textures, self-illumination, that objects "
-      "are hidden");
+  EXPECT_EQ(mesh.notes[0],
+            "dropped: 4 bytes behind the file's own, bump maps, cameras, highlights, lights, second "
+            "textures, self-illumination, that objects "
+            "are hidden");
 }
 
 TEST_F(StudioTest, Refusals) {
