@@ -5,69 +5,20 @@
 #include <bit>
 
 #include "formats/volume_chunks.h"
-#include "libcolor/dag/void_search.h"
+#include "libcolor/dag/box_walk.h"
 #include "libcolor/store.h"
 #include "libcolor/surface/morton.h"
 
 namespace voxkit::color {
 namespace {
 
-constexpr int64_t leaf_side = int64_t{1} << leaf_height;
-
 Voxel opaque(Rgb c) {
   return Voxel::of(static_cast<uint32_t>(c.r | c.g << 8 | c.b << 16) | 0xff000000u);
 }
-Index3 octant_corner(Index3 corner, uint32_t octant, int64_t side) {
-  return corner + Index3(octant & 1, octant >> 1 & 1, octant >> 2) * side;
-}
 
-/// Walks through the nodes of a DAG that touch a box, in Morton order. `visit` gets leaf words, where they
-/// begin, the number of their first colour and how they are gone through, and says whether to go on.
-class BoxWalk {
- public:
-  BoxWalk(const DagView& view, const Box& box) : view_(view), box_(box) {}
-
-  template <class Visit>
-  bool run(const Visit& visit) const {
-    return node(view_.height, view_.root, Index3(0), 0, first_state(view_.curve), visit);
-  }
-
- private:
-  template <class Visit>
-  bool node(int h, uint32_t pointer, Index3 corner, uint64_t color, OrderState state,
-            const Visit& visit) const {
-    if (h == leaf_height) return visit(view_.leaf(pointer), corner, color, state);
-    const NodeRef ref = view_.node(h, pointer);
-    if (!ref.there) return true;
-    const int64_t side = int64_t{1} << (h - 1);
-    const auto& next_state = octant_orders.next[state];
-    std::array<ChildRef, 8> children;  // by octant
-    // Where counts are in nodes those of the octants before are added up, each once.
-    uint64_t before = view_.colors == Colors::all ? 1 : 0;
-    for (const uint8_t octant : octant_orders.octant[state]) {
-      if (!ref.has(octant)) continue;
-      if (view_.counts == Counts::pointer) {
-        children[octant] = view_.child(ref, h, octant, state);
-        continue;
-      }
-      children[octant] = {view_.pointer(ref, octant), before};
-      before += view_.colors_below(h - 1, children[octant].pointer);
-    }
-    for (uint32_t octant = 0; octant < 8; ++octant) {
-      const Index3 at = octant_corner(corner, octant, side);
-      if (ref.has(octant) && !intersect({at, at + side}, box_).empty() &&
-          !node(h - 1, children[octant].pointer, at, color + children[octant].colors_before,
-                next_state[octant], visit))
-        return false;
-    }
-    return true;
-  }
-
-  const DagView& view_;
-  Box box_;
-};
-
-/// The same through an octree or a DAG, whichever there is; false if `visit` did not go on.
+/// Calls visit(word, corner, color, state) for the leaf words that touch a box, in Morton order, through an
+/// octree or a DAG, whichever there is: where they begin, the number of their first colour, how they are gone
+/// through. False if `visit` did not go on, or a node is missing or has no octants.
 template <class Visit>
 Result<bool> walk_box(const Volume& volume, const Box& box, const Visit& visit) {
   const Store& store = volume.store();
@@ -77,7 +28,9 @@ Result<bool> walk_box(const Volume& volume, const Box& box, const Visit& visit) 
       return visit(word, corner, first, morton_state);
     });
   VOX_TRY(const DagView* const view, store.dag(volume.container(), volume.params()));
-  return BoxWalk(*view, box).run(visit);
+  return BoxWalk(*view, box).run([&](const WalkedCell& cell) {
+    return visit(view->leaf(cell.pointer), cell.corner, cell.color, cell.state);
+  });
 }
 
 }  // namespace
@@ -141,20 +94,19 @@ Status Volume::decode(const Box& box, VoxelSpan out) const {
   if (!info_.box().contains(box))
     return fail(ErrorCode::internal, container_->name(), "box outside the volume");
   fill(out, box.size(), VoxelFormat::rgba32, {});
+  if (params_.leaf_voxels == 0) return {};
   ColorReader reader(*store_, *container_, params_);
-  VOX_CHECK(walk_box(*this, box, [&](uint64_t leaf, Index3 corner, uint64_t color, OrderState state) {
-    const bool inside = box.contains(Box{corner, corner + leaf_side});
-    for (uint64_t left = leaf; left != 0; left &= left - 1) {
-      const auto bit = static_cast<uint32_t>(std::countr_zero(left));
-      const auto at = morton_place(bit);
-      const Index3 place = corner + Index3(at);
-      if (!inside && !box.contains(place)) continue;
-      const Voxel voxel = opaque(reader.color(color + leaf_index(leaf, bit, params_.colors, state)));
-      const Index3 to = place - box.lo;
-      std::memcpy(out.row(to.y, to.z) + to.x * 4, voxel.bytes.data(), 4);
-    }
-    return true;
-  }));
+  VOX_TRY(const bool complete,
+          walk_box(*this, box, [&](uint64_t leaf, Index3 corner, uint64_t color, OrderState state) {
+            for (uint64_t left = leaf & leaf_within(corner, box); left != 0; left &= left - 1) {
+              const auto bit = static_cast<uint32_t>(std::countr_zero(left));
+              const Voxel voxel = opaque(reader.color(color + leaf_index(leaf, bit, params_.colors, state)));
+              const Index3 to = corner + Index3(morton_place(bit)) - box.lo;
+              std::memcpy(out.row(to.y, to.z) + to.x * 4, voxel.bytes.data(), 4);
+            }
+            return true;
+          }));
+  if (!complete) store_->report(*container_, "chunk NODE: a node is missing, or has no octants");
   return store_->status();
 }
 
