@@ -10,8 +10,8 @@
 
 #include "formats/mapped_file.h"
 #include "formats/reservation.h"
-#include "libcolor/surface/linear_light.h"
 #include "libcolor/surface/morton.h"
+#include "libcolor/surface/voxel_means.h"
 
 namespace voxkit::color {
 namespace {
@@ -23,46 +23,6 @@ bool by_place(const SurfaceVoxel& a, const SurfaceVoxel& b) {
   return a.place < b.place;
 }
 
-/// The mean of the points of each voxel, whose places ascend.
-class Means {
- public:
-  explicit Means(const SurfaceSource::Sink& sink) : sink_(sink), tables_(light_tables()) {
-    run_.reserve(run_voxels);
-  }
-  Status add(const SurfaceVoxel& point) {
-    if (count_ > 0 && point.place != place_) VOX_CHECK(put());
-    place_ = point.place;
-    sum_[0] += tables_.linear[point.color.r];
-    sum_[1] += tables_.linear[point.color.g];
-    sum_[2] += tables_.linear[point.color.b];
-    ++count_;
-    return {};
-  }
-  Status finish() {
-    if (count_ > 0) VOX_CHECK(put());
-    return run_.empty() ? Status() : sink_(run_);
-  }
-
- private:
-  static constexpr size_t run_voxels = 1 << 14;
-  Status put() {
-    const auto mean = [&](uint64_t light) { return tables_.stored[(2 * light + count_) / (2 * count_)]; };
-    run_.push_back({place_, {mean(sum_[0]), mean(sum_[1]), mean(sum_[2])}});
-    std::fill_n(sum_, 3, 0);
-    count_ = 0;
-    if (run_.size() < run_voxels) return {};
-    VOX_CHECK(check_interrupt());
-    VOX_CHECK(sink_(run_));
-    run_.clear();
-    return {};
-  }
-
-  const SurfaceSource::Sink& sink_;
-  const LightTables& tables_;
-  std::vector<SurfaceVoxel> run_;
-  uint64_t place_ = 0, sum_[3] = {}, count_ = 0;
-};
-
 /// Sorted parts, one after the other, in an unlinked file.
 class PartFile {
  public:
@@ -73,7 +33,7 @@ class PartFile {
   }
   bool empty() const { return sizes_.empty(); }
   /// All of them, sorted.
-  Status merge(Means& means) {
+  Status merge(VoxelMeans& means) {
     VOX_TRY(const auto file, writer_.map());
     const auto* at = reinterpret_cast<const SurfaceVoxel*>(file->bytes().data());
     struct Rest {
@@ -145,7 +105,7 @@ class PointSurface final : public SurfaceSource {
       return {};
     }));
     std::sort(part.begin(), part.end(), by_place);
-    Means means(sink);
+    VoxelMeans means(sink);
     if (parts.empty()) {
       for (const SurfaceVoxel& point : part) VOX_CHECK(means.add(point));
     } else {
