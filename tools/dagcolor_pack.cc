@@ -31,8 +31,11 @@ void declare(CommandLine& line, Options& o) {
                 "(menger:5, terrain:N, terrain:N:box), or .dagc file",
                 o.input);
   line.file("-o,--output", "OUT", "Output (.dagc), or -", o.output, true);
-  line.option("--resolution", "N", "Of a mesh or points: voxels along the longest side (1024)",
-              integer(o.surface.resolution, 1, int64_t{1} << color::most_levels));
+  line.option(
+      "--resolution", "N",
+      "Of a mesh or points: voxels along the longest side (1024). Of a .dagc file: its own, or a half, "
+      "a quarter ... of it: voxels become one, in their mean color",
+      integer(o.surface.resolution, 1, int64_t{1} << color::most_levels));
   line.option("--surface", "KIND",
               "Of a mesh: thin: no more voxels than make it tight; conservative: all that it touches (thin)",
               one_of(o.kind, {"thin", "conservative"}));
@@ -235,6 +238,7 @@ int main(int argc, char** argv) {
       "  dagcolor-pack model.nrrd -o model.dagc --threshold 6.38 --verify\n"
       "  dagcolor-pack model.nrrd -o model.dagc --codec raw\n"
       "  dagcolor-pack house.glb -o house.dagc --codec bc1 --image-curve hilbert\n"
+      "  dagcolor-pack house.dagc -o coarse.dagc --resolution 512\n"
       "  dagcolor-pack house.dagc --tiles tile-%04d.dds -o other.dagc --codec bc7\n",
       [&](CommandLine& line) { declare(line, options); }, [&](Run& run) { return work(options, run); });
 }

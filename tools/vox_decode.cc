@@ -8,6 +8,7 @@
 #include "formats/fill.h"
 #include "formats/volume/open_volume.h"
 #include "formats/volume/readers.h"
+#include "libcolor/edit/levels.h"
 #include "libsvmm/packed/salvage.h"
 #include "tools/common/input.h"
 #include "tools/common/json.h"
@@ -52,21 +53,24 @@ void declare(CommandLine& line, Options& o) {
                        "Values that a narrower type's ends stand for (default: least and greatest value)");
 }
 
-/// All voxels of a surface, one by one: void costs nothing.
-Result<int> write_voxels(const Options& o, const color::Volume& volume, Run& run) {
-  const VolumeInfo& info = volume.info();
+/// All voxels of a level of a surface, one by one: void costs nothing.
+Result<int> write_voxels(const Options& o, const std::shared_ptr<const color::Volume>& volume, Run& run) {
   run.stage("decode");
   const double start = run.seconds();
-  VOX_CHECK(write_surface(volume, o.output, run.options.force, run.ctx));
+  // Colours of cells are found by counts, of which each follows but a few.
+  if (o.level > 0) VOX_CHECK(volume->check(run.ctx));
+  VOX_TRY(const uint64_t voxels, color::level_voxels(*volume, o.level));
+  const auto surface = color::surface_of(volume, o.level);
+  const VolumeInfo& info = surface->info();
+  VOX_CHECK(write_surface(*surface, voxels, o.output, run.options.force, run.ctx));
   const double seconds = run.seconds() - start;
-  run.note(fmt::format("{}: {} {} in {:.2f} s", o.output, volume.params().leaf_voxels,
+  run.note(fmt::format("{}: {} {} in {:.2f} s", o.output, voxels,
                        has_ending(o.output, ".ply") ? "points" : "voxels", seconds));
   if (run.options.json) {
     Json json = Json::result();
     json.set("tool", run.tool).set("version", version_text()).set("input", o.input).set("output", o.output);
-    json.set("dims", info.dims)
-        .set("voxel_format", name(info.format))
-        .set("leaf_voxels", volume.params().leaf_voxels);
+    json.set("level", o.level).set("dims", info.dims);
+    json.set("voxel_format", name(info.format)).set("leaf_voxels", voxels);
     json.set("decode_seconds", seconds)
         .set("peak_rss_bytes", peak_rss_bytes())
         .set("threads", run.options.threads);
@@ -97,14 +101,17 @@ Result<int> write_images(const Options& o, Run& run) {
 }
 
 /// A surface of few voxels, as a dense grid, may be larger than anybody expects.
-void warn_of_size(const Options& o, const Input& input, const VolumeInfo& info, Run& run) {
+Status warn_of_size(const Options& o, const Input& input, const VolumeInfo& info, Run& run) {
   constexpr uint64_t many = uint64_t{1} << 30, per_voxel = 64;
   const uint64_t bytes = raw_bytes(info);
-  if (!input.color || bytes < many || bytes / per_voxel < input.color->params().leaf_voxels) return;
+  if (!input.color || bytes < many) return {};
+  VOX_TRY(const uint64_t voxels, color::level_voxels(*input.color, o.level));
+  if (bytes / per_voxel < voxels) return {};
   run.say(
       fmt::format("{}: {} voxels become a grid of {:.3g} GB: --roi takes a part; .vdb, .ply and .vox hold "
                   "voxels only",
-                  o.output, input.color->params().leaf_voxels, static_cast<double>(bytes) / 1e9));
+                  o.output, voxels, static_cast<double>(bytes) / 1e9));
+  return {};
 }
 
 /// What a damaged file has lost: a line, with --verbose one for each page.
@@ -147,13 +154,14 @@ Result<int> work(const Options& o, Run& run) {
     VOX_TRY(input.source, svmm::open_salvaged(input.packed, o.level, losses));
   }
   if (input.color && is_surface_output(o.output) && !o.roi && !o.type)
-    return write_voxels(o, *input.color, run);
+    return write_voxels(o, input.color, run);
   // Boxes are found by counts, of which each box follows but a few.
   if (input.color && !o.roi) VOX_CHECK(input.color->check(run.ctx));
   auto source = std::move(input.source);
   if (o.roi) {
     const VolumeInfo whole = input.svmm     ? input.svmm->info()
                              : input.packed ? input.packed->info()
+                             : input.color  ? input.color->info()
                                             : source->info();
     const Index3 dims = whole.dims;
     if (!whole.box().contains(*o.roi))
@@ -162,16 +170,16 @@ Result<int> work(const Options& o, Run& run) {
                       dims.y, dims.z));
     // Every voxel of the level that the box touches.
     const int64_t factor =
-        input.svmm     ? static_cast<int64_t>(input.svmm->levels()[static_cast<size_t>(o.level)].mip_factor)
-        : input.packed ? int64_t{1} << o.level
-                       : 1;
+        input.svmm ? static_cast<int64_t>(input.svmm->levels()[static_cast<size_t>(o.level)].mip_factor)
+        : input.packed || input.color ? int64_t{1} << o.level
+                                      : 1;
     const Box part{o.roi->lo / factor, (o.roi->hi + (factor - 1)) / factor};
     VOX_TRY(source, crop(std::move(source), part, run.ctx));
   }
   VOX_TRY(source, retyped(std::move(source), nullptr, o.type, o.range, run));
   source = fill_restored(std::move(source));
   const VolumeInfo info = source->info();
-  warn_of_size(o, input, info, run);
+  VOX_CHECK(warn_of_size(o, input, info, run));
   VOX_TRY(auto sink, create_volume(o.output, info, run.options.force, run.ctx));
   run.stage("decode");
   const double start = run.seconds();
@@ -210,6 +218,7 @@ int main(int argc, char** argv) {
       "  vox-decode head.svmm -o small.nrrd --level 2\n"
       "  vox-decode damaged.svmm -o rest.nrrd --salvage\n"
       "  vox-decode house.dagc -o house.ply\n"
+      "  vox-decode house.dagc -o small.vox --level 2\n"
       "  vox-decode house.dagc -o tile-%04d.png --tiles\n"
       "  vox-decode house.dagc -o house.vox\n"
       "  vox-decode head.svmm -o slice-%04d.png --type u8\n",

@@ -32,6 +32,7 @@ libcolor/blocks   -> formats libcolor/surface libcolor/terms
 libcolor/palette  -> formats libcolor/surface libcolor/terms libcolor/blocks
 libcolor/textures -> formats formats/image libcolor/surface libcolor/terms libcolor/blocks
 libcolor          -> formats formats/image libcolor/surface libcolor/terms libcolor/dag libcolor/octree libcolor/blocks libcolor/palette libcolor/textures
+libcolor/edit     -> formats libcolor libcolor/surface libcolor/terms libcolor/dag
 libmetrics        -> formats formats/image
 librender         -> formats formats/image
 librender/cast    -> formats librender libsvmm libsvmm/packed libcolor libcolor/dag libcolor/surface

@@ -1,8 +1,13 @@
 #include "tools/common/surface_input.h"
 
+#include <fmt/format.h>
+
+#include <algorithm>
+
 #include "formats/mesh/mesh.h"
 #include "formats/mesh/point_cloud.h"
 #include "formats/volume/readers.h"
+#include "libcolor/edit/levels.h"
 #include "libcolor/surface/point_surface.h"
 #include "libcolor/surface/volume_surface.h"
 #include "libcolor/surface/voxel_list.h"
@@ -28,12 +33,41 @@ Surface voxelise(const std::string& name, const SurfaceOptions& options, Context
   return color::make_surface(std::move(mesh), voxelise, ctx);
 }
 
+tl::unexpected<Error> has_voxels(const std::string& name) {
+  return fail(ErrorCode::usage, name, "--resolution: has voxels already: expected a mesh");
+}
+
+/// What has been compressed before, at a resolution that it has.
+Surface reopened(const std::string& name, std::shared_ptr<const color::Volume> volume,
+                 std::optional<int64_t> resolution) {
+  const auto resolution_of = [&](int level) {
+    const Index3 dims = color::level_info(volume->info(), level).dims;
+    return std::max({dims.x, dims.y, dims.z});
+  };
+  const int levels = color::level_count(volume->info());
+  int level = 0;
+  while (resolution && level < levels && resolution_of(level) != *resolution) ++level;
+  if (level < levels) return color::surface_of(std::move(volume), level, color::CellColors::means);
+  std::string possible;
+  for (level = 0; level < levels; ++level)
+    possible += (level == 0 ? "" : level + 1 < levels ? ", " : " or ") + std::to_string(resolution_of(level));
+  return fail(ErrorCode::usage, name,
+              fmt::format("--resolution {}: has voxels already, which can be halved: expected {}",
+                          *resolution, possible));
+}
+
 Surface open_any(const std::string& name, const SurfaceOptions& options, Context& ctx) {
   if (options.frame && !has_ending(name, ".vox"))
     return fail(ErrorCode::usage, name, "--frame: is no animated model: expected a .vox file");
+<<<<<<< HEAD
   if (is_mesh_name(name) || is_points_name(name)) return voxelise(name, options, ctx);
   if (options.resolution)
     return fail(ErrorCode::usage, name, "--resolution: has voxels already: expected a mesh");
+=======
+  if (is_mesh_name(name)) return voxelise(name, options, ctx);
+  const bool may_be_compressed = has_ending(name, ".dagc") || name == "-";
+  if (options.resolution && !may_be_compressed) return has_voxels(name);
+>>>>>>> 3e263b7 (Levels of detail of coloured surfaces: vox-decode --level, dagcolor-pack --resolution)
   if (color::is_terrain(name)) return color::open_terrain(name);
   if (has_ending(name, ".vox")) {
     VOX_TRY(VoxelScene scene, read_magicavoxel(name, ctx, options.frame.value_or(0)));
@@ -42,6 +76,8 @@ Surface open_any(const std::string& name, const SurfaceOptions& options, Context
   OpenOptions open = options.open;
   open.other_kinds += "meshes (.obj .gltf .glb .ply .stl .3ds), points (.ply .pcd .las), models (.vox), ";
   VOX_TRY(Input input, open_input(name, open, ctx));
+  if (input.color) return reopened(name, std::move(input.color), options.resolution);
+  if (options.resolution) return has_voxels(name);
   return color::surface_of(std::move(input.source));
 }
 

@@ -13,7 +13,7 @@ namespace voxkit::cli {
 
 struct SurfaceOptions {
   OpenOptions open;
-  std::optional<int64_t> resolution;  ///< of meshes: voxels along the longest side
+  std::optional<int64_t> resolution;  ///< of meshes and .dagc files: voxels along the longest side
   color::SurfaceKind kind = color::SurfaceKind::thin;
   bool emission = true;           ///< of meshes: is added to the colours
   std::optional<uint32_t> frame;  ///< of an animated .vox model
