@@ -1,6 +1,7 @@
 // vox-convert: from any volume format to any other, whole or in part.
 #include <fmt/core.h>
 
+#include "formats/chunk_zstd.h"
 #include "formats/convert.h"
 #include "formats/copy.h"
 #include "formats/fill.h"
@@ -11,11 +12,13 @@
 #include "tools/common/json.h"
 #include "tools/common/main.h"
 #include "tools/common/retype.h"
+#include "tools/convert_surface.h"
 
 namespace voxkit::cli {
 namespace {
 
 struct Options {
+  std::vector<std::string> inputs;
   std::string input, output;
   OpenOptions open;
   std::optional<std::string> type;
@@ -25,11 +28,32 @@ struct Options {
   std::optional<ValueRange> range;
   bool apply_scale = false;
   std::string orient;
+  bool merge = false;
+  std::optional<Index3> translate;
+  int zstd = 0;
 };
 
+/// A move by whole voxels.
+Parser steps(std::optional<Index3>& value) {
+  return [&value](const std::string& text) -> Status {
+    constexpr int64_t most = int64_t{1} << color::most_levels;
+    const auto read = read_integers(text, -most, most);
+    if (!read || read->size() != 3)
+      return bad_usage(
+          fmt::format("\"{}\": expected X,Y,Z, whole numbers of voxels from -{} to {}", text, most, most));
+    value = Index3((*read)[0], (*read)[1], (*read)[2]);
+    return {};
+  };
+}
+
 void declare(CommandLine& line, Options& o) {
-  line.argument("INPUT", "Volume file, folder, built-in such as menger:5, or -", o.input);
-  line.file("-o,--output", "OUT", "Volume file, pattern such as slice-%04d.tif, or -", o.output, true);
+  line.arguments("INPUT",
+                 "Volume file, folder, built-in such as menger:5, or -; with --merge one .dagc file or more",
+                 o.inputs);
+  line.file("-o,--output", "OUT",
+            "Volume file, pattern such as slice-%04d.tif, or -; of .dagc files also a .dagc file, with the "
+            "colors that they decode to, exactly",
+            o.output, true);
   line.option("--type", "TYPE",
               "u8 i8 u16 i16 f32 rgba8 bit: type of the output; of a .raw INPUT, its own type",
               [&o](const std::string& text) -> Status {
@@ -47,6 +71,17 @@ void declare(CommandLine& line, Options& o) {
       o.orient);
   line.option("--crop", "BOX", "X0,Y0,Z0,X1,Y1,Z1: part of the input, half open", box(o.crop));
   line.option("--resample", "X,Y,Z", "New extent, after --crop", dims(o.resample));
+  line.flag("--merge",
+            "From .dagc files to one: each where its world says, which must lead to one lattice; of a voxel "
+            "that several have, that of the file named first counts",
+            o.merge);
+  line.option("--translate", "X,Y,Z",
+              "From .dagc to .dagc: move the voxels in their grid, which stays where it is (before --crop); "
+              "what leaves the grid is dropped",
+              steps(o.translate));
+  line.option("--zstd", "LEVEL",
+              "Of a .dagc output: compress the parts of the file with zstd as well, 1 to 19 (not)",
+              integer(o.zstd, 1, most_zstd_level));
   declare_input_options(line, o.open, false);
 }
 
@@ -73,6 +108,20 @@ Result<std::unique_ptr<VolumeSource>> open(const Options& o, Context& ctx) {
 }
 
 Result<int> work(Options& o, Run& run) {
+  if (has_ending(o.output, ".dagc")) {
+    if (o.type || o.output_type || o.range || o.apply_scale || !o.orient.empty() || o.resample)
+      return bad_usage(
+          "--type, --output-type, --range, --apply-scale, --orient, --resample: not of a .dagc output: leave "
+          "them out");
+  } else if (o.merge || o.translate || o.zstd > 0) {
+    return bad_usage(
+        "--merge, --translate, --zstd: expected a .dagc output: vox-decode makes volumes of that");
+  }
+  if (o.inputs.size() > 1 && !o.merge)
+    return bad_usage(fmt::format("a second input, \"{}\": expected one, or --merge", o.inputs[1]));
+  if (has_ending(o.output, ".dagc"))
+    return convert_surfaces({o.inputs, o.output, o.merge, o.translate, o.crop, o.zstd}, run);
+  o.input = o.inputs.front();
   if (has_ending(o.input, ".raw")) {
     o.open.type = o.type;
   } else if (o.type) {
@@ -130,6 +179,8 @@ int main(int argc, char** argv) {
       "  vox-convert scan.raw --dims 256,256,225 --type u8 -o scan.nii.gz\n"
       "  vox-convert head.nii.gz -o head.nrrd --type u8 --range 0,1200\n"
       "  vox-convert big.nrrd -o small.nrrd --crop 0,0,0,512,512,256 --resample 256,256,128\n"
-      "  vox-convert scan.nrrd -o slice-%04d.tif\n",
+      "  vox-convert scan.nrrd -o slice-%04d.tif\n"
+      "  vox-convert house.dagc -o door.dagc --crop 0,0,0,64,128,32\n"
+      "  vox-convert west.dagc east.dagc -o both.dagc --merge\n",
       [&](CommandLine& line) { declare(line, options); }, [&](Run& run) { return work(options, run); });
 }

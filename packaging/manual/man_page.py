@@ -30,7 +30,7 @@ def name_line(table):
 
 def synopsis(table):
     required = [f"{bold(min(option.names, key=len))} {italic(option.value)}" for option in table.options if option.required]
-    arguments = [italic(argument.name) for argument in table.arguments]
+    arguments = [italic(argument.name) + (" ..." if argument.several else "") for argument in table.arguments]
     return " ".join([bold(table.tool), f"[{italic('OPTIONS')}]", *required, *arguments])
 
 

@@ -23,6 +23,7 @@ class Argument:
     """Names a file."""
     name: str
     help: str
+    several: bool = False  # it may be given more than once
 
 
 @dataclasses.dataclass(frozen=True)

@@ -27,5 +27,5 @@ def specifications(option):
 
 def completion(table):
     lines = [specification for option in table.options for specification in specifications(option)]
-    lines += [quoted(f":{message(argument.name)}:_files") for argument in table.arguments]
+    lines += [quoted(f"{'*' if argument.several else ''}:{message(argument.name)}:_files") for argument in table.arguments]
     return f"#compdef {table.tool}\n# zsh completion; made from what its --help shows.\n_arguments -s -S \\\n  " + " \\\n  ".join(lines) + "\n"

@@ -5,6 +5,8 @@
 #include <glm/common.hpp>
 
 #include "libcolor/color.h"
+#include "libcolor/edit/arrangement.h"
+#include "libcolor/edit/levels.h"
 #include "libcolor/surface/morton.h"
 #include "tests/attack.h"
 
@@ -66,12 +68,44 @@ inline void ask(const Volume& volume, Answer& answer, Context& ctx) {
     answer.fault = "check() finds nothing wrong, but voxels cannot be read: " + walked.error().what;
 }
 
+/// What is made of it: a box of a level, and a part that is moved, beside the whole.
+inline void ask_edits(const Volume& volume, Answer& answer, Context& ctx) {
+  const std::shared_ptr<const Volume> shared(std::shared_ptr<const Volume>(), &volume);
+  const int level = std::min(1, level_count(volume.info()) - 1);
+  const Index3 size = glm::min(level_info(volume.info(), level).dims, Index3(16));
+  std::vector<std::byte> voxels(static_cast<size_t>(Box{Index3(0), size}.voxels()) * 4);
+  const VoxelSpan span = packed(voxels.data(), size, VoxelFormat::rgba32);
+  const Status decoded = open_level(shared, level, CellColors::stored)->read({Index3(0), size}, span);
+  VolumeInfo info = volume.info();
+  info.dims = glm::min(info.dims + Index3(1), Index3(24));
+  Arrangement arrangement({{shared, Index3(1, -2, 0)}, {shared, Index3(0)}}, info);
+  uint64_t next = 0;
+  bool sound = true;
+  const Status arranged = arrangement.read(ctx, [&](std::span<const SurfaceVoxel> run) -> Status {
+    for (const SurfaceVoxel& v : run) {
+      sound &= v.place >= next && Box{Index3(0), info.dims}.contains(Index3(morton_place(v.place)));
+      next = v.place + 1;
+    }
+    return {};
+  });
+  if (!sound) answer.fault = "voxels of an arrangement out of order, or outside";
+  for (const Status& status : {decoded, arranged}) {
+    if (status || !answer.fault.empty()) continue;
+    answer.fault = voxkit::test::judge(status.error());
+    if (answer.checked) answer.fault = "check() finds nothing wrong, but edits do: " + status.error().what;
+  }
+}
+
 inline Answer attack(std::span<const std::byte> file) {
   MemoryBudget decoded(uint64_t{256} << 20);
   const auto open = [&](const std::shared_ptr<const Container>& container) {
     return Volume::open(container, &decoded);
   };
-  return voxkit::test::attack_with<Answer>(file, open, ask);
+  return voxkit::test::attack_with<Answer>(file, open,
+                                           [](const Volume& volume, Answer& answer, Context& ctx) {
+                                             ask(volume, answer, ctx);
+                                             if (answer.fault.empty()) ask_edits(volume, answer, ctx);
+                                           });
 }
 
 }  // namespace voxkit::color::test

@@ -140,6 +140,11 @@ void CommandLine::argument(const std::string& metavar, const std::string& help, 
   state_->app.add_option(metavar, value, help)->required()->type_name("");
 }
 
+void CommandLine::arguments(const std::string& metavar, const std::string& help,
+                            std::vector<std::string>& values) {
+  state_->app.add_option(metavar, values, help)->required()->type_name("");
+}
+
 void CommandLine::declare_common() {
   CLI::App& app = state_->app;
   CommonOptions& options = state_->options;
@@ -175,8 +180,8 @@ std::string CommandLine::description() const {
   for (const CLI::Option* option : app.get_options()) {
     Json entry = Json::object();
     if (option->get_positional()) {
-      arguments.push(
-          std::move(entry.set("name", option->get_name(true)).set("help", option->get_description())));
+      entry.set("name", option->get_name(true)).set("help", option->get_description());
+      arguments.push(std::move(entry.set("several", option->get_items_expected_max() > 1)));
       continue;
     }
     Json names = Json::array(), excludes = Json::array(), words = Json::array();

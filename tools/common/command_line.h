@@ -42,6 +42,8 @@ class CommandLine {
   void flag(const std::string& names, const std::string& help, bool& value);
   /// An argument without a name, which must be given and names a file; in the order of the calls.
   void argument(const std::string& metavar, const std::string& help, std::string& value);
+  /// One such argument, or more; the last of the calls.
+  void arguments(const std::string& metavar, const std::string& help, std::vector<std::string>& values);
 
   /// What to do after the arguments have been read: the work, or print a text and stop: help, version, or, of
   /// `--describe` alone, all of this as JSON, from which manual pages and completions are made
