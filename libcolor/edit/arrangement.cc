@@ -6,6 +6,7 @@
 #include <cmath>
 #include <deque>
 
+#include "formats/reservation.h"
 #include "libcolor/edit/sound_walk.h"
 #include "libcolor/layout.h"
 #include "libcolor/surface/morton.h"
@@ -209,6 +210,10 @@ Arrangement::Arrangement(std::vector<Placed> surfaces, VolumeInfo info) : surfac
 
 Status Arrangement::read(Context& ctx, const Sink& sink) {
   census_ = {};
+  // Up to eight pieces of each reach into an octant, and a list that grows has room for twice as many.
+  constexpr uint64_t surface_bytes = (most_levels + 1) * 8 * 8 * 2 * sizeof(Piece) + sizeof(Reading);
+  VOX_TRY(const Reservation memory,
+          Reservation::take(surfaces_.size() * surface_bytes, "a walk through surfaces", ctx));
   Walk walk(info_.dims, sink, ctx, census_);
   for (const Placed& placed : surfaces_) VOX_CHECK(walk.add(placed));
   return walk.run();

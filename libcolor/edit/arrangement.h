@@ -16,14 +16,14 @@ struct Placed {
 };
 
 /// The voxels of some surfaces in a grid, with the colours that they have. Where several have one, that of
-/// the first one counts. What is outside of the grid is left out. Memory: some KiB a surface.
+/// the first one counts. What is outside of the grid is left out. Memory: 160 KiB a surface.
 class Arrangement final : public SurfaceSource {
  public:
-  /// `info`: of the grid; no side above 2^21, and the places of surfaces within 2^22 of it. At most 2^16
-  /// surfaces.
+  /// `info`: of the grid; no side above 2^21, and the places of surfaces within 2^23 of it.
   Arrangement(std::vector<Placed> surfaces, VolumeInfo info);
 
-  /// Can be called any number of times. Errors: ErrorCode::input where a surface is damaged, with its name.
+  /// Can be called any number of times. Errors: ErrorCode::input where a surface is damaged, with its name;
+  /// ErrorCode::limit; those of the sink.
   Status read(Context& ctx, const Sink& sink) override;
 
   /// What the last `read` came across.

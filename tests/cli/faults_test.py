@@ -41,6 +41,7 @@ OUTPUTS = {
     "svmm as nrrd": ("vox-decode", ["@/a.svmm"], "a.nrrd"),
     "svmm as vdb": ("vox-decode", ["@/a.svmm"], "a.vdb"),
     "vqv as nii": ("vox-decode", ["@/a.vqv"], "a.nii"),
+    "dagc as dagc": ("vox-convert", ["@/a.dagc", "--crop", "1,1,1,63,17,64"], "b.dagc"),
     "dagc as ply": ("vox-decode", ["@/a.dagc"], "a.ply"),
     "dagc as vox": ("vox-decode", ["@/a.dagc"], "a.vox"),
     "dagc as vdb": ("vox-decode", ["@/a.dagc"], "a.vdb"),
