@@ -174,7 +174,8 @@ int main(int argc, char** argv) {
   using namespace voxkit::cli;
   Options options;
   return run_tool(
-      argc, argv, "vox-convert", "Converts between volume formats; crops, moves and merges coloured surfaces.",
+      argc, argv, "vox-convert",
+      "Converts between volume formats; crops, moves and merges coloured surfaces.",
       "  vox-convert menger:4 -o sponge.nrrd\n"
       "  vox-convert scan.raw --dims 256,256,225 --type u8 -o scan.nii.gz\n"
       "  vox-convert head.nii.gz -o head.nrrd --type u8 --range 0,1200\n"
