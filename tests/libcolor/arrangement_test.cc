@@ -1,6 +1,8 @@
 // Surfaces that are cropped, moved and merged, against sets of voxels.
 #include "libcolor/edit/arrangement.h"
 
+#include <set>
+
 #include "formats/volume_chunks.h"
 #include "libcolor/edit/exact.h"
 #include "libcolor/edit/lattice.h"
@@ -126,8 +128,19 @@ TEST(Arrangement, OfSeveralSurfacesTheFirstOneCounts) {
 }
 
 TEST(Arrangement, EntersNothingThatIsVoidOrOutside) {
-  const auto volume = volume_of(sphere_shell(7), Index3(128), raw());
+  const Voxels shell = sphere_shell(7);
+  const auto volume = volume_of(shell, Index3(128), raw());
   ASSERT_TRUE(volume);
+  // Cells of 4 voxels a side and larger ones, up to all, that have any: each once.
+  const auto cells_with_voxels = [&](Index3 corner, int height) {
+    std::set<std::pair<int, uint64_t>> cells;
+    for (const SurfaceVoxel& voxel : shell) {
+      const Index3 at = Index3(morton_place(voxel.place)) - corner;
+      if (!Box{Index3(0), Index3(int64_t{1} << height)}.contains(at)) continue;
+      for (int h = leaf_height; h <= height; ++h) cells.insert({h, voxel.place >> 3 * h});
+    }
+    return cells.size();
+  };
   const auto cells = [&](Index3 lo, Index3 dims) {
     VolumeInfo info;
     info.dims = dims;
@@ -137,6 +150,9 @@ TEST(Arrangement, EntersNothingThatIsVoidOrOutside) {
   };
   const uint64_t all = cells(Index3(0), Index3(128));
   EXPECT_GT(all, 3000u);
+  EXPECT_EQ(all, cells_with_voxels(Index3(0), 7));
+  EXPECT_EQ(cells(Index3(64, 0, 64), Index3(64)), cells_with_voxels(Index3(64, 0, 64), 6));
+  EXPECT_EQ(cells(Index3(96, 32, 96), Index3(32)), cells_with_voxels(Index3(96, 32, 96), 5));
   // Cells of the shell, of 4 voxels a side: some hundredths of the whole.
   EXPECT_LT(cells(Index3(0, 56, 56), Index3(16)), all / 20);
   EXPECT_LT(cells(Index3(1, 57, 58), Index3(16)), all / 20);
