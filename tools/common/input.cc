@@ -46,15 +46,9 @@ Result<Input> open_codec(std::shared_ptr<const Container> container, std::option
     return input;
   }
   if (container->codec() == Codec::color) {
-<<<<<<< HEAD
-    VOX_CHECK(check_level(1));
-    VOX_TRY(input.color, color::Volume::open(std::move(container), ctx.memory, ctx.threads));
-    input.source = color::open_source(input.color);
-=======
-    VOX_TRY(input.color, color::Volume::open(container, ctx.memory));
+    VOX_TRY(input.color, color::Volume::open(container, ctx.memory, ctx.threads));
     VOX_CHECK(check_level(color::level_count(input.color->info())));
     input.source = color::open_level(input.color, level.value_or(0), color::CellColors::stored);
->>>>>>> 3e263b7 (Levels of detail of coloured surfaces: vox-decode --level, dagcolor-pack --resolution)
     return input;
   }
   if (svmm::is_packed(*container)) {

@@ -59,15 +59,9 @@ Surface reopened(const std::string& name, std::shared_ptr<const color::Volume> v
 Surface open_any(const std::string& name, const SurfaceOptions& options, Context& ctx) {
   if (options.frame && !has_ending(name, ".vox"))
     return fail(ErrorCode::usage, name, "--frame: is no animated model: expected a .vox file");
-<<<<<<< HEAD
   if (is_mesh_name(name) || is_points_name(name)) return voxelise(name, options, ctx);
-  if (options.resolution)
-    return fail(ErrorCode::usage, name, "--resolution: has voxels already: expected a mesh");
-=======
-  if (is_mesh_name(name)) return voxelise(name, options, ctx);
   const bool may_be_compressed = has_ending(name, ".dagc") || name == "-";
   if (options.resolution && !may_be_compressed) return has_voxels(name);
->>>>>>> 3e263b7 (Levels of detail of coloured surfaces: vox-decode --level, dagcolor-pack --resolution)
   if (color::is_terrain(name)) return color::open_terrain(name);
   if (has_ending(name, ".vox")) {
     VOX_TRY(VoxelScene scene, read_magicavoxel(name, ctx, options.frame.value_or(0)));
