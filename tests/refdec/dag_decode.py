@@ -99,6 +99,7 @@ class Surface:
         require(not any(c.kind in (b"OCTD", b"MASK", not_here) for c in self.container.chunks.values()),
                 "chunks OCTD, MASK and {}: beside a DAG with {}", not_here.decode(), kind.decode())
         self.leaves = self.words(b"LEAF", 0, "Q", 8)
+        require(self.leaves, "chunk LEAF: no words")
         self.nodes = {h: self.words(kind, h, "B" if symmetric else "I", 1 if symmetric else 4) for h in range(3, self.height + 1)}
         indices = [c.index for c in self.container.chunks.values() if c.kind == kind]
         require(sorted(indices) == list(range(3, self.height + 1)), "chunks {}: indices {}", kind.decode(), sorted(indices))

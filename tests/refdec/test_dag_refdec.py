@@ -61,6 +61,10 @@ class SmallFile(unittest.TestCase):
             struct.pack_into(layout, getattr(self, chunk), offset, value)
             with self.subTest(chunk=chunk, offset=offset, value=value), self.assertRaises(Refused):
                 decode(Surface(Container(self.file())))
+        self.setUp()
+        self.leaf.clear()
+        with self.assertRaisesRegex(Refused, "LEAF"):
+            decode(Surface(Container(self.file())))
 
 
 # ---- With tools ------------------------------------------------------------------------------------------------------
