@@ -134,10 +134,8 @@ Status write_symmetric(const SymmetricDag& symmetric, ContainerWriter& container
 }
 
 /// Or as the masks of an octree.
-Status write_octree(const Dag& dag, ContainerWriter& container, Params& p, Context& ctx) {
-  Reservation memory(*ctx.memory);
-  VOX_TRY(const Octree octree, octree_of(dag, memory));
-  VOX_TRY(const EncodedOctree encoded, encode_octree(octree, ctx));
+Status write_octree(const EncodedOctree& encoded, ContainerWriter& container, Params& p) {
+  p.geometry = Geometry::octree;
   p.dag_bytes = encoded.bytes;
   p.dag_nodes = encoded.nodes;
   VOX_CHECK(container.add(octree_kind, 0, 0, encoded.directory));
@@ -146,20 +144,33 @@ Status write_octree(const Dag& dag, ContainerWriter& container, Params& p, Conte
   return {};
 }
 
+uint64_t bytes_of(const SymmetricDag& dag) {
+  uint64_t bytes = dag.leaves.size() * sizeof(uint64_t);
+  for (const auto& nodes : dag.nodes) bytes += nodes.size();
+  return bytes;
+}
+
 Status write_geometry(const Dag& dag, const Options& options, ContainerWriter& container, Params& p,
                       Context& ctx) {
-  if (options.geometry == Geometry::octree) {
-    p.geometry = Geometry::octree;
-    return write_octree(dag, container, p, ctx);
+  const auto wanted = [&](Geometry geometry) { return options.geometry.value_or(geometry) == geometry; };
+  std::optional<SymmetricDag> symmetric;
+  if (wanted(Geometry::ssvdag) && options.counts == Counts::node) {
+    auto made = symmetric_dag_of(dag, ctx);
+    if (made) {
+      symmetric = std::move(*made);
+    } else {
+      if (options.geometry || made.error().code != ErrorCode::limit)
+        return tl::unexpected<Error>(made.error());
+      ctx.note("geometry is stored without symmetry: " + made.error().what);
+    }
   }
-  if (options.geometry.value_or(Geometry::ssvdag) == Geometry::ssvdag && options.counts == Counts::node) {
-    const auto symmetric = symmetric_dag_of(dag, ctx);
-    if (symmetric) return write_symmetric(*symmetric, container, p);
-    if (options.geometry || symmetric.error().code != ErrorCode::limit)
-      return tl::unexpected<Error>(symmetric.error());
-    ctx.note("geometry is stored without symmetry: " + symmetric.error().what);
+  if (options.geometry ? *options.geometry == Geometry::octree : options.for_storage) {
+    Reservation memory(*ctx.memory);
+    VOX_TRY(const Octree octree, octree_of(dag, memory));
+    VOX_TRY(const EncodedOctree encoded, encode_octree(octree, ctx));
+    if (!symmetric || encoded.bytes <= bytes_of(*symmetric)) return write_octree(encoded, container, p);
   }
-  return write_dag(dag, container, p);
+  return symmetric ? write_symmetric(*symmetric, container, p) : write_dag(dag, container, p);
 }
 
 /// Room for more colours, ahead of need: counted, and so is the copy while they move.
@@ -205,8 +216,10 @@ Result<Report> encode(SurfaceSource& source, const Options& options, const Store
   const auto start = Clock::now();
   const VolumeInfo& info = source.info();
   const int height = height_of(info.dims);
-  if (info.format != VoxelFormat::rgba32 || height > most_levels || !checked_voxels(info.dims))
+  if (info.format != VoxelFormat::rgba32 || height > most_levels)
     return fail(ErrorCode::internal, {}, "not the extents of a surface");
+  if (!checked_voxels(info.dims))
+    return fail(ErrorCode::limit, {}, "a grid of 2^63 voxels or more: use a lower --resolution");
   ContainerWriter container(sink, Codec::color, container_version_for(info), options.zstd, *ctx.memory);
   VOX_CHECK(add_volume_info(container, info));
 

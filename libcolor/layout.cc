@@ -97,6 +97,8 @@ Result<Params> unpack_params(std::span<const std::byte> bytes, const VolumeInfo&
   if (p.geometry > Geometry::octree) return bad(91, fmt::format("unknown geometry {}", field(91)));
   if (p.geometry == Geometry::ssvdag && p.counts == Counts::pointer)
     return bad(2, "counts beside pointers, which nodes with symmetry have not");
+  if (p.geometry == Geometry::octree && load_le<uint32_t>(&bytes[24]) != 0)
+    return bad(24, "a root, which an octree has not");
   p.height = field(4);
   p.weight_bits = field(5);
   p.leaf_voxels = number(8);

@@ -113,8 +113,9 @@ struct Options {
   Colors colors = Colors::leaf;
   Counts counts = Counts::node;
   /// Not said: ssvdag, or dag with Counts::pointer, and where an ssvdag would take more than its pointers
-  /// reach or there is memory for.
+  /// reach or there is memory for; `for_storage`: or octree, if that is smaller.
   std::optional<Geometry> geometry;
+  bool for_storage = false;
   Curve curve = Curve::morton;  ///< in which order voxels have their colours
   int zstd = 0;                 ///< level of zstd for the file's chunks, 1 to 19; 0: as they are
 };

@@ -136,11 +136,10 @@ Status Store::open_octree(const Container& container, const Params& params) cons
   VOX_TRY(const auto directory, container.chunk(octree_directory_));
   std::vector<uint64_t> sizes;
   for (const size_t part : masks_) sizes.push_back(container.table()[part].length);
-  auto reader = OctreeReader::open(
-      directory, params.height, params.leaf_voxels, std::move(sizes),
-      [this, &container](uint64_t part) { return container.chunk(masks_[part]); }, memory_);
-  if (!reader) return fail(reader.error().code, container.name(), "chunk OCTD: " + reader.error().what);
-  octree_ = std::move(*reader);
+  VOX_TRY(octree_, OctreeReader::open(
+                       directory, params.height, params.leaf_voxels, std::move(sizes),
+                       [this, &container](uint64_t part) { return container.chunk(masks_[part]); },
+                       container.name(), memory_));
   return {};
 }
 

@@ -98,6 +98,7 @@ Status Volume::decode(const Box& box, VoxelSpan out) const {
   ColorReader reader(*store_, *container_, params_);
   VOX_TRY(const bool complete,
           walk_box(*this, box, [&](uint64_t leaf, Index3 corner, uint64_t color, OrderState state) {
+            if (leaf == 0) return false;
             for (uint64_t left = leaf & leaf_within(corner, box); left != 0; left &= left - 1) {
               const auto bit = static_cast<uint32_t>(std::countr_zero(left));
               const Voxel voxel = opaque(reader.color(color + leaf_index(leaf, bit, params_.colors, state)));
@@ -106,7 +107,7 @@ Status Volume::decode(const Box& box, VoxelSpan out) const {
             }
             return true;
           }));
-  if (!complete) store_->report(*container_, "chunk NODE: a node is missing, or has no octants");
+  if (!complete) store_->report(*container_, "chunk NODE: a node or a word is missing, or without voxels");
   return store_->status();
 }
 

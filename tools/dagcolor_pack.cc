@@ -84,9 +84,11 @@ void declare(CommandLine& line, Options& o) {
               one_of(o.counts, {"node", "pointer"}));
   line.option(
       "--geometry", "HOW",
-      "dag: nodes with pointers, as published; ssvdag: mirror images once as well, pointers of 2 to 4 "
-      "bytes: a third to two thirds of that; octree: masks alone, entropy-coded: a tenth to a fourth, but "
-      "decoded as a whole before it is drawn; auto: ssvdag, or octree for storage (auto)",
+      "dag: nodes with pointers, as published; ssvdag: mirror images once as well, pointers of 2 to 4 bytes: "
+      "half of that, more or less; octree: masks alone, entropy-coded: of scenes and scans a tenth to a "
+      "fourth, "
+      "but decoded as a whole before it is drawn; auto: ssvdag, or for storage the smaller of that and "
+      "octree (auto)",
       one_of(o.geometry, {"auto", "dag", "ssvdag", "octree"}));
   line.option("--for", "WHAT",
               "What the file is made for: access or storage, which sets what is auto (access)",
@@ -107,7 +109,7 @@ void declare(CommandLine& line, Options& o) {
 std::optional<color::Geometry> geometry_of(const Options& o) {
   if (o.geometry == "dag") return color::Geometry::dag;
   if (o.geometry == "ssvdag") return color::Geometry::ssvdag;
-  if (o.geometry == "octree" || o.purpose == "storage") return color::Geometry::octree;
+  if (o.geometry == "octree") return color::Geometry::octree;
   return {};
 }
 
@@ -122,6 +124,7 @@ color::Options encoder_options(const Options& o) {
   options.space = o.space == "lab" ? color::ErrorSpace::lab : color::ErrorSpace::rgb;
   options.colors = o.colors == "all" ? color::Colors::all : color::Colors::leaf;
   options.geometry = geometry_of(o);
+  options.for_storage = o.purpose == "storage";
   options.counts = o.counts == "pointer" ? color::Counts::pointer : color::Counts::node;
   return options;
 }

@@ -68,11 +68,18 @@ ContextSamples::Packed ContextSamples::packed(const Facts& facts) {
   return bits;
 }
 
-void ContextSamples::append(ContextSamples&& other) {
+ContextSamples ContextSamples::joined(std::vector<ContextSamples>&& parts) {
+  ContextSamples all;
   for (size_t solid = 0; solid < 2; ++solid) {
-    of_[solid].insert(of_[solid].end(), other.of_[solid].begin(), other.of_[solid].end());
-    other.of_[solid] = {};
+    size_t count = 0;
+    for (const ContextSamples& part : parts) count += part.of_[solid].size();
+    all.of_[solid].reserve(count);
+    for (ContextSamples& part : parts) {
+      all.of_[solid].insert(all.of_[solid].end(), part.of_[solid].begin(), part.of_[solid].end());
+      part.of_[solid] = {};
+    }
   }
+  return all;
 }
 
 ContextSamples::Counts ContextSamples::count(const std::array<Range, 2>& ranges) const {

@@ -14,7 +14,8 @@ namespace voxkit::color {
 class ContextSamples {
  public:
   void add(const Facts& facts, bool solid) { of_[solid ? 1 : 0].push_back(packed(facts)); }
-  void append(ContextSamples&& other);
+  /// All of some, of which each is given back as it is taken.
+  static ContextSamples joined(std::vector<ContextSamples>&& parts);
   uint64_t size() const { return of_[0].size() + of_[1].size(); }
   static constexpr uint64_t sample_bytes = 24;
 

@@ -33,7 +33,7 @@ void visit_page(const Octree& octree, int height, uint64_t page, const Visit& vi
 Result<ContextTree> grow_tree(const Octree& octree, int height, Context& ctx) {
   const uint64_t pages = octree.level(height).pages(), sampled = std::min(pages, sampled_pages);
   VOX_TRY(const Reservation memory,
-          Reservation::take(2 * 8 * page_nodes * sampled * ContextSamples::sample_bytes,
+          Reservation::take(8 * page_nodes * (sampled + sampled / 4 + 1) * ContextSamples::sample_bytes,
                             "samples of an octree's masks", ctx));
   std::vector<ContextSamples> parts(sampled);
   VOX_CHECK(parallel_for(ctx, static_cast<int64_t>(sampled), [&](int64_t i) -> Status {
@@ -42,9 +42,7 @@ Result<ContextTree> grow_tree(const Octree& octree, int height, Context& ctx) {
                [&](const Facts& facts, bool solid) { parts[number].add(facts, solid); });
     return {};
   }));
-  ContextSamples samples;
-  for (ContextSamples& part : parts) samples.append(std::move(part));
-  return std::move(samples).grow(pages / sampled, ctx);
+  return ContextSamples::joined(std::move(parts)).grow(pages / sampled, ctx);
 }
 
 std::vector<std::byte> encode_page(const Octree& octree, int height, uint64_t page,

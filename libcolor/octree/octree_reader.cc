@@ -11,10 +11,12 @@ namespace voxkit::color {
 
 Result<std::unique_ptr<OctreeReader>> OctreeReader::open(std::span<const std::byte> directory, int height,
                                                          uint64_t voxels, std::vector<uint64_t> part_sizes,
-                                                         PartBytes parts, MemoryBudget& memory) {
-  const auto wrong = [](const std::string& what) { return bad_input({}, what); };
+                                                         PartBytes parts, std::string name,
+                                                         MemoryBudget& memory) {
+  const auto wrong = [&](const std::string& what) { return bad_input(name, "chunk OCTD: " + what); };
   std::unique_ptr<OctreeReader> reader(new OctreeReader);
   reader->parts_ = std::move(parts);
+  reader->name_ = name;
   reader->reservation_ = Reservation(memory);
   if (voxels == 0) {
     if (!directory.empty() || !part_sizes.empty()) return wrong("nodes, and no voxels");
@@ -28,8 +30,9 @@ Result<std::unique_ptr<OctreeReader>> OctreeReader::open(std::span<const std::by
   const auto heights = static_cast<size_t>(height) + 1;
   reader->trees_.resize(heights);
   for (size_t h = heights - 1; h > 0; --h) {
-    VOX_TRY(const ContextTree tree, ContextTree::read(in));
-    reader->trees_[h] = ContextLookup(tree);
+    const auto tree = ContextTree::read(in);
+    if (!tree) return wrong(tree.error().what);
+    reader->trees_[h] = ContextLookup(*tree);
   }
   if (!in.at_end()) return wrong("its trees of contexts do not end where they should");
 
@@ -85,7 +88,7 @@ Status OctreeReader::decode_page(int height, uint64_t page) {
   VOX_TRY(const auto part, parts_(place.part));
   const auto damaged = [&] {
     return bad_input(
-        {}, fmt::format("chunk MASK 0.{}: page {} of height {} is damaged", place.part, page, height));
+        name_, fmt::format("chunk MASK 0.{}: page {} of height {} is damaged", place.part, page, height));
   };
   NodeWalk walk(*octree_, height, page);
   const ContextLookup& tree = trees_[static_cast<size_t>(height)];

@@ -20,12 +20,12 @@ class OctreeReader {
   /// The bytes of a part of the masks, which stay.
   using PartBytes = std::function<Result<std::span<const std::byte>>(uint64_t part)>;
 
-  /// Of a grid of 2^height voxels a side with so many voxels, in parts of these sizes. Memory: a byte a node
-  /// and an eighth. Errors: ErrorCode::input for a directory that is not as FORMAT.md has it,
-  /// ErrorCode::limit.
+  /// Of a grid of 2^height voxels a side with so many voxels, in parts of these sizes; `name` is for
+  /// messages. Memory: a byte a node and an eighth. Errors: ErrorCode::input for a directory that is not as
+  /// FORMAT.md has it, ErrorCode::limit.
   static Result<std::unique_ptr<OctreeReader>> open(std::span<const std::byte> directory, int height,
                                                     uint64_t voxels, std::vector<uint64_t> part_sizes,
-                                                    PartBytes parts, MemoryBudget& memory);
+                                                    PartBytes parts, std::string name, MemoryBudget& memory);
 
   int height() const { return octree_->height(); }
   /// Decodes all pages, on ctx.threads threads.
@@ -94,6 +94,7 @@ class OctreeReader {
   std::vector<Page> pages_;           ///< of all heights, the highest first
   std::vector<uint64_t> first_page_;  ///< by height
   PartBytes parts_;
+  std::string name_;
   Reservation reservation_;
   std::recursive_mutex loading_;
   mutable std::mutex mutex_;

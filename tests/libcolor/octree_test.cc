@@ -49,7 +49,7 @@ Result<std::unique_ptr<OctreeReader>> opened(const EncodedOctree& bytes, int hei
   return OctreeReader::open(
       bytes.directory, height, voxels, sizes,
       [&](uint64_t part) -> Result<std::span<const std::byte>> { return std::span(bytes.parts[part]); },
-      memory);
+      "file", memory);
 }
 Voxels voxels_of(const OctreeReader& reader, const Box& box) {
   Voxels voxels;
