@@ -7,6 +7,8 @@ Options exact_options(std::span<const Params> files) {
   Options options;
   options.colors = first.colors;
   options.counts = first.counts;
+  // An ssvdag stays the choice of the encoder, as the result may be too large for one.
+  if (first.geometry != Geometry::ssvdag) options.geometry = first.geometry;
   options.curve = first.curve;
   options.image_curve = first.image_curve;
   options.codec = ColorCodec::vws;

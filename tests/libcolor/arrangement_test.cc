@@ -260,6 +260,12 @@ TEST(ExactOptions, TakeTheFirstFilesWayWhereItIsExact) {
   EXPECT_EQ(codec(C::palette, C::palette, 1 << 15, 1 << 15).codec, C::palette);
   EXPECT_EQ(codec(C::palette, C::palette, 1 << 15, (1 << 15) + 1).codec, C::vws);
   EXPECT_EQ(codec(C::palette, C::raw, 5).codec, C::vws);
+  for (const Geometry geometry : {Geometry::dag, Geometry::octree}) {
+    files[0].geometry = geometry;
+    EXPECT_EQ(exact_options(files).geometry, geometry);
+  }
+  files[0].geometry = Geometry::ssvdag;
+  EXPECT_EQ(exact_options(files).geometry, std::nullopt);
 }
 
 /// A file in which 8^17 ways lead from the root to a node that has nothing in it: no reader follows them all.
