@@ -88,6 +88,17 @@ std::string random_suffix() {
   return suffix;
 }
 
+/// A name is as durable as the data only once its folder is on disk; file systems that cannot do that say
+/// EINVAL.
+Status flush_folder(const std::string& name, const std::string& target) {
+  const int folder = open(folder_of(target).c_str(), O_RDONLY | O_DIRECTORY | O_CLOEXEC);
+  if (folder < 0) return {};
+  const bool failed = fsync(folder) != 0 && errno == EIO;
+  close(folder);
+  if (failed) return output_error(name, "its folder cannot be flushed to disk: Input/output error");
+  return {};
+}
+
 /// What a name means as an output.
 enum class Kind { standard_output, through, file };
 
@@ -196,7 +207,7 @@ Status OutputFile::write(const std::string& text) {
   return write(std::as_bytes(std::span(text)));
 }
 
-Status OutputFile::commit() {
+Status OutputFile::complete() {
   if (temporary_.empty()) {
     if (fd_ == STDOUT_FILENO) return {};
     const int closed = close(fd_);
@@ -213,7 +224,12 @@ Status OutputFile::commit() {
   const int closed = close(fd_);
   fd_ = -1;
   if (closed != 0) return system_error(name_, "cannot be completed", errno);
+  return {};
+}
 
+Status OutputFile::give_name() {
+  if (temporary_.empty()) return {};
+  const std::string target = resolve(name_);
   int renamed = -1;
   if (!force_) {
     // Somebody may have created the name since it was checked.
@@ -230,15 +246,38 @@ Status OutputFile::commit() {
   forget(temporary_);
   temporary_.clear();
 
-  // The name is as durable as the data only once the folder is on disk; file systems that cannot do that say
-  // EINVAL.
-  const int folder = open(folder_of(target).c_str(), O_RDONLY | O_DIRECTORY | O_CLOEXEC);
-  if (folder >= 0) {
-    const bool failed = fsync(folder) != 0 && errno == EIO;
-    close(folder);
-    if (failed) return output_error(name_, "its folder cannot be flushed to disk: Input/output error");
-  }
-  return {};
+  named_ = true;
+  return flush_folder(name_, target);
+}
+
+Status OutputFile::commit() {
+  VOX_CHECK(complete());
+  return give_name();
+}
+
+Status OutputFile::swap_in() {
+  if (!force_ || temporary_.empty()) return give_name();
+  const std::string target = resolve(name_);
+  swapped_ = renameat2(AT_FDCWD, temporary_.c_str(), AT_FDCWD, target.c_str(), RENAME_EXCHANGE) == 0;
+  return swapped_ ? flush_folder(name_, target) : give_name();
+}
+
+void OutputFile::swap_out() {
+  const std::string target = resolve(name_);
+  if (swapped_)
+    renameat2(AT_FDCWD, temporary_.c_str(), AT_FDCWD, target.c_str(), RENAME_EXCHANGE);
+  else if (named_)
+    unlink(target.c_str());
+}
+
+Status commit_together(std::span<const std::unique_ptr<OutputFile>> files) {
+  for (const auto& file : files) VOX_CHECK(file->complete());
+  for (size_t i = 0; i < files.size(); ++i)
+    if (Status named = files[i]->swap_in(); !named) {
+      for (size_t done = i + 1; done-- > 0;) files[done]->swap_out();
+      return named;
+    }
+  return {};  // old files go with their temporary names
 }
 
 }  // namespace voxkit

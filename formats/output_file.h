@@ -36,12 +36,23 @@ class OutputFile {
   Status commit();
 
  private:
+  friend Status commit_together(std::span<const std::unique_ptr<OutputFile>> files);
   OutputFile() = default;
+  /// Permissions, the disk, and no more writing: what is left is the name.
+  Status complete();
+  Status give_name();
+  /// The same, but an old file of that name changes places with the new one; and back.
+  Status swap_in();
+  void swap_out();
   int fd_ = -1;
-  bool force_ = false;
+  bool force_ = false, named_ = false, swapped_ = false;
   uint64_t position_ = 0;
   std::string name_, temporary_;
 };
+
+/// `commit` of several files that belong together: all of them have their names then, or none. Where one
+/// cannot, those before it lose theirs again, and the old files are back.
+Status commit_together(std::span<const std::unique_ptr<OutputFile>> files);
 
 /// The checks of `OutputFile::create` without creating anything: for a tool to run before any work.
 Status check_output(const std::string& path, bool force);

@@ -84,6 +84,8 @@ class Volume {
   std::optional<Voxel> uniform(const Box& box) const;
   /// All voxels in Morton order, in runs.
   Status for_each_voxel(const SurfaceSource::Sink& sink, Context& ctx) const;
+  /// Those in a box inside the volume. Whether counts add up is known of the whole only: see `check`.
+  Status for_each_voxel(const Box& box, const SurfaceSource::Sink& sink) const;
   /// Verifies every checksum, node, count and block.
   Status check(Context& ctx) const;
 

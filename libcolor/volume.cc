@@ -133,13 +133,22 @@ Status Volume::for_each_voxel(const SurfaceSource::Sink& sink, Context& ctx) con
   if (params_.leaf_voxels == 0) return {};
   VOX_TRY(OctreeReader* const octree, store_->octree(*container_, params_));
   if (octree != nullptr) VOX_CHECK(octree->decode_all(ctx));
+  return for_each_voxel(info_.box(), sink);
+}
+
+Status Volume::for_each_voxel(const Box& box, const SurfaceSource::Sink& sink) const {
+  if (!info_.box().contains(box))
+    return fail(ErrorCode::internal, container_->name(), "box outside the volume");
+  if (params_.leaf_voxels == 0 || box.empty()) return {};
+  const bool whole = box == info_.box();
   ColorReader reader(*store_, *container_, params_);
-  constexpr size_t run_voxels = 1 << 16;
+  constexpr uint64_t run_voxels = 1 << 16;
   std::vector<SurfaceVoxel> run;
   run.reserve(run_voxels + 64);
-  uint64_t found = 0;
+  uint64_t found = 0, flushed = 0;
   Status status;
   const auto flush = [&] {
+    flushed = found;
     status = check_interrupt();
     if (status) status = store_->status();
     if (status && !run.empty()) status = sink(run);
@@ -147,28 +156,36 @@ Status Volume::for_each_voxel(const SurfaceSource::Sink& sink, Context& ctx) con
     return status.has_value();
   };
   const auto complete =
-      walk_box(*this, info_.box(), [&](uint64_t leaf, Index3 corner, uint64_t color, OrderState state) {
+      walk_box(*this, box, [&](uint64_t leaf, Index3 corner, uint64_t color, OrderState state) {
         const uint64_t first = morton_code(static_cast<uint32_t>(corner.x), static_cast<uint32_t>(corner.y),
                                            static_cast<uint32_t>(corner.z));
         // A word without voxels is of no surface, and there may be any number of them.
         // Counts that do not add up would give voxels the colors of others. (Along a Hilbert curve they come
-        // in another order.)
-        if (params_.colors == Colors::leaf && params_.curve == Curve::morton && color != found) {
+        // in another order, and of a part there are others in between.)
+        if (whole && params_.colors == Colors::leaf && params_.curve == Curve::morton && color != found) {
           store_->report(*container_, "chunk NODE: counts of colors that do not add up");
           return false;
         }
         found += static_cast<uint64_t>(std::popcount(leaf));
         if (leaf == 0 || found > params_.leaf_voxels) return false;
-        for (uint64_t left = leaf; left != 0; left &= left - 1) {
+        const uint64_t inside = leaf & leaf_within(corner, box);
+        if (whole && inside != leaf) {
+          const Index3 at =
+              corner + Index3(morton_place(static_cast<uint64_t>(std::countr_zero(leaf & ~inside))));
+          store_->report(*container_, fmt::format("chunk LEAF: a voxel at {},{},{}: outside the volume", at.x,
+                                                  at.y, at.z));
+          return false;
+        }
+        for (uint64_t left = inside; left != 0; left &= left - 1) {
           const auto bit = static_cast<uint32_t>(std::countr_zero(left));
           run.push_back({first | bit, reader.color(color + leaf_index(leaf, bit, params_.colors, state))});
         }
-        return run.size() < run_voxels || flush();
+        return found - flushed < run_voxels || flush();
       });
   VOX_CHECK(complete);
   if (*complete) flush();
   if (status) status = store_->status();
-  if (status && (!*complete || found != params_.leaf_voxels))
+  if (status && (!*complete || (whole && found != params_.leaf_voxels)))
     return bad_input(container_->name(),
                      fmt::format("chunk DAGP, byte 8: {} voxels: others are there", params_.leaf_voxels));
   return status;

@@ -33,8 +33,8 @@ void declare(CommandLine& line, Options& o) {
   line.file("-o,--output", "OUT", "Output (.dagc), or -", o.output, true);
   line.option(
       "--resolution", "N",
-      "Of a mesh or points: voxels along the longest side (1024). Of a .dagc file: its own, or a half, "
-      "a quarter ... of it: voxels become one, in their mean color",
+      "Of a mesh or points: voxels along the longest side (1024; of what vox-decode wrote, its own grid). "
+      "Of a .dagc file: its own, or a half, a quarter ... of it: voxels become one, in their mean color",
       integer(o.surface.resolution, 1, int64_t{1} << color::most_levels));
   line.option("--surface", "KIND",
               "Of a mesh: thin: no more voxels than make it tight; conservative: all that it touches (thin)",

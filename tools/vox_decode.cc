@@ -6,6 +6,7 @@
 #include "formats/convert.h"
 #include "formats/copy.h"
 #include "formats/fill.h"
+#include "formats/mesh/voxel_faces.h"
 #include "formats/volume/open_volume.h"
 #include "formats/volume/readers.h"
 #include "libcolor/edit/levels.h"
@@ -26,6 +27,7 @@ struct Options {
   int level = 0;
   std::optional<TargetType> type;
   std::optional<ValueRange> range;
+  std::string enclosed = "keep";
   bool tiles = false, salvage = false;
 };
 
@@ -33,13 +35,17 @@ void declare(CommandLine& line, Options& o) {
   line.argument("FILE", "Compressed volume (.svmm, .vqv, .dagc), or -", o.input);
   line.file(
       "-o,--output", "OUT",
-      "Volume file, pattern such as slice-%04d.tif, or -; of a .dagc file also points (.ply) or MagicaVoxel "
-      "models (.vox; more than 255 colors become the nearest of a palette)",
+      "Volume file, pattern such as slice-%04d.tif, or -; of a .dagc file also meshes (.glb, .obj), points "
+      "(.ply) or MagicaVoxel models (.vox; more than 255 colors become the nearest of a palette)",
       o.output, true);
   line.option("--roi", "BOX", "X0,Y0,Z0,X1,Y1,Z1: part of the volume, half open, in voxels of level 0",
               box(o.roi));
   line.option("--level", "N", "Stop at this mip level; 0: all detail", integer(o.level, 0, 64));
   line.option("--type", "TYPE", "Type of the output: u8 i8 u16 i16 f32 rgba8 bit", target_type(o.type));
+  line.option("--enclosed", "HOW",
+              "Of a mesh: voxels that have voxels on all sides, and no face: keep: as points, so that "
+              "dagcolor-pack finds them; drop (keep)",
+              one_of(o.enclosed, {"keep", "drop"}));
   line.flag("--tiles",
             "Of a .dagc file: the images of its colours, one for each 2^20; OUT is a pattern such as "
             "tile-%04d.png (or .jpg .jp2; .dds of bc1 and bc7; .astc of astc)",
@@ -53,24 +59,45 @@ void declare(CommandLine& line, Options& o) {
                        "Values that a narrower type's ends stand for (default: least and greatest value)");
 }
 
-/// All voxels of a level of a surface, one by one: void costs nothing.
+Status check_box(const Box& box, const Index3& dims) {
+  if (Box{{0, 0, 0}, dims}.contains(box)) return {};
+  return bad_usage(fmt::format("--roi: the box is not inside the volume: expected one inside 0,0,0,{},{},{}",
+                               dims.x, dims.y, dims.z));
+}
+
+/// What a mesh does not show.
+void report_enclosed(const Options& o, const SurfaceCount& count, Run& run) {
+  if (count.enclosed == 0) return;
+  run.say(fmt::format("{}: {} of {} voxels have voxels on all sides, and no face: {}", o.output,
+                      count.enclosed, count.voxels,
+                      o.enclosed == "keep" ? "they are points: --enclosed drop leaves them out" : "dropped"));
+}
+
+/// The voxels of a level of a surface, or a part of it, one by one: void costs nothing.
 Result<int> write_voxels(const Options& o, const std::shared_ptr<const color::Volume>& volume, Run& run) {
+  const color::Level level(volume, o.level);
+  SurfaceOutput what{level.info().box(), o.enclosed == "keep"};
+  if (o.roi) {
+    VOX_CHECK(check_box(*o.roi, volume->info().dims));
+    what.box = level.touched(*o.roi);
+  }
+  const bool mesh = is_face_output(o.output);
   run.stage("decode");
   const double start = run.seconds();
   // Colours of cells are found by counts, of which each follows but a few.
-  if (o.level > 0) VOX_CHECK(volume->check(run.ctx));
-  VOX_TRY(const uint64_t voxels, color::level_voxels(*volume, o.level));
-  const auto surface = color::surface_of(volume, o.level);
-  const VolumeInfo& info = surface->info();
-  VOX_CHECK(write_surface(*surface, voxels, o.output, run.options.force, run.ctx));
+  if (o.level > 0 && !o.roi) VOX_CHECK(volume->check(run.ctx));
+  VOX_TRY(const SurfaceCount count, write_surface(level, what, o.output, run.options.force, run.ctx));
   const double seconds = run.seconds() - start;
-  run.note(fmt::format("{}: {} {} in {:.2f} s", o.output, voxels,
-                       has_ending(o.output, ".ply") ? "points" : "voxels", seconds));
+  report_enclosed(o, count, run);
+  run.note(fmt::format("{}: {} {}{} in {:.2f} s", o.output, count.voxels,
+                       has_ending(o.output, ".ply") ? "points" : "voxels",
+                       mesh ? fmt::format(" as {} rectangles", count.faces) : "", seconds));
   if (run.options.json) {
     Json json = Json::result();
     json.set("tool", run.tool).set("version", version_text()).set("input", o.input).set("output", o.output);
-    json.set("level", o.level).set("dims", info.dims);
-    json.set("voxel_format", name(info.format)).set("leaf_voxels", voxels);
+    json.set("level", o.level).set("dims", what.box.size());
+    json.set("voxel_format", name(level.info().format)).set("leaf_voxels", count.voxels);
+    if (mesh) json.set("rectangles", count.faces).set("enclosed_voxels", count.enclosed);
     json.set("decode_seconds", seconds)
         .set("peak_rss_bytes", peak_rss_bytes())
         .set("threads", run.options.threads);
@@ -105,12 +132,13 @@ Status warn_of_size(const Options& o, const Input& input, const VolumeInfo& info
   constexpr uint64_t many = uint64_t{1} << 30, per_voxel = 64;
   const uint64_t bytes = raw_bytes(info);
   if (!input.color || bytes < many) return {};
-  VOX_TRY(const uint64_t voxels, color::level_voxels(*input.color, o.level));
+  const color::Level level(input.color, o.level);
+  VOX_TRY(const uint64_t voxels, level.count(level.info().box()));
   if (bytes / per_voxel < voxels) return {};
-  run.say(
-      fmt::format("{}: {} voxels become a grid of {:.3g} GB: --roi takes a part; .vdb, .ply and .vox hold "
-                  "voxels only",
-                  o.output, voxels, static_cast<double>(bytes) / 1e9));
+  run.say(fmt::format(
+      "{}: {} voxels become a grid of {:.3g} GB: --roi takes a part; .vdb, .ply, .vox, .glb and .obj "
+      "hold voxels only",
+      o.output, voxels, static_cast<double>(bytes) / 1e9));
   return {};
 }
 
@@ -139,22 +167,32 @@ Result<int> work(const Options& o, Run& run) {
     return bad_usage("--json and the output - both use standard output");
   if (o.tiles) return write_images(o, run);
   VOX_CHECK(check_distinct(o.input, o.output));
+  if (has_ending(o.output, ".gltf"))
+    return fail(ErrorCode::usage, o.output, "meshes are written as .glb or .obj: expected one of these");
   const bool only_surface = is_only_surface_output(o.output);
-  if (only_surface && (o.roi || o.type))
-    return bad_usage("--roi, --type: not of points and models: leave them out, or name a volume");
-  VOX_CHECK(only_surface ? check_output(o.output, run.options.force)
-                         : check_volume_output(o.output, run.options.force));
+  if (only_surface && o.type)
+    return bad_usage("--type: not of points, models and meshes: leave it out, or name a volume");
+  if (o.enclosed != "keep" && !is_face_output(o.output))
+    return bad_usage("--enclosed: of meshes only: expected an output that ends in .glb or .obj");
+  if (only_surface) {
+    for (const std::string& file : files_of_surface(o.output)) {
+      VOX_CHECK(check_distinct(o.input, file));
+      VOX_CHECK(check_output(file, run.options.force));
+    }
+  } else {
+    VOX_CHECK(check_volume_output(o.output, run.options.force));
+  }
   VOX_TRY(Input input, open_compressed(o.input, o.level, run.ctx));
   if (only_surface && !input.color)
-    return fail(ErrorCode::usage, o.input, "points and models are made of surfaces: expected a .dagc file");
+    return fail(ErrorCode::usage, o.input,
+                "points, models and meshes are made of surfaces: expected a .dagc file");
   const auto losses = std::make_shared<svmm::Losses>();
   if (o.salvage) {
     if (!input.packed)
       return fail(ErrorCode::usage, o.input, "--salvage: expected a .svmm file of layout packed");
     VOX_TRY(input.source, svmm::open_salvaged(input.packed, o.level, losses));
   }
-  if (input.color && is_surface_output(o.output) && !o.roi && !o.type)
-    return write_voxels(o, input.color, run);
+  if (input.color && is_surface_output(o.output) && !o.type) return write_voxels(o, input.color, run);
   // Boxes are found by counts, of which each box follows but a few.
   if (input.color && !o.roi) VOX_CHECK(input.color->check(run.ctx));
   auto source = std::move(input.source);
@@ -164,10 +202,7 @@ Result<int> work(const Options& o, Run& run) {
                              : input.color  ? input.color->info()
                                             : source->info();
     const Index3 dims = whole.dims;
-    if (!whole.box().contains(*o.roi))
-      return bad_usage(
-          fmt::format("--roi: the box is not inside the volume: expected one inside 0,0,0,{},{},{}", dims.x,
-                      dims.y, dims.z));
+    VOX_CHECK(check_box(*o.roi, dims));
     // Every voxel of the level that the box touches.
     const int64_t factor =
         input.svmm ? static_cast<int64_t>(input.svmm->levels()[static_cast<size_t>(o.level)].mip_factor)
@@ -217,6 +252,7 @@ int main(int argc, char** argv) {
       "  vox-decode head.vqv -o part.nii.gz --roi 0,0,0,64,64,64\n"
       "  vox-decode head.svmm -o small.nrrd --level 2\n"
       "  vox-decode damaged.svmm -o rest.nrrd --salvage\n"
+      "  vox-decode house.dagc -o house.glb\n"
       "  vox-decode house.dagc -o house.ply\n"
       "  vox-decode house.dagc -o small.vox --level 2\n"
       "  vox-decode house.dagc -o tile-%04d.png --tiles\n"

@@ -4,6 +4,7 @@
 #include <set>
 
 #include "formats/mesh/gltf_json.h"
+#include "formats/mesh/voxel_grid.h"
 
 namespace voxkit::gltf {
 namespace {
@@ -323,6 +324,9 @@ class Reader {
         made.local = placement_of(translation, rotation, scale);
       if (const Json* const instancing = node.extension("EXT_mesh_gpu_instancing"))
         VOX_CHECK(read_instances(node.below(*instancing), made));
+      if (const Json* const extras = node.find("extras"))
+        if (const Json* const grid = node.below(*extras).find(voxel_grid_name.data()))
+          made.grid = voxel_grid_of(*grid);
       out_.nodes.push_back(std::move(made));
     }
     return {};

@@ -116,6 +116,7 @@ struct Node {
     uint32_t translation = none, rotation = none, scale = none;
   };
   std::optional<Instances> instances;  ///< EXT_mesh_gpu_instancing
+  std::optional<VolumeInfo> grid;      ///< of voxels, in the node's coordinates: voxel_grid.h, in extras
 };
 struct Skin {
   std::vector<uint32_t> joints;

@@ -3,6 +3,7 @@
 #include <fmt/format.h>
 
 #include <array>
+#include <glm/matrix.hpp>
 #include <map>
 #include <set>
 #include <string_view>
@@ -67,6 +68,7 @@ class SceneReader {
     std::map<uint32_t, std::vector<Placement>> places;  // of meshes that are the same everywhere
     for (const uint32_t index : order_) {
       const Node& node = document_.nodes[index];
+      if (node.grid) add_grid(*node.grid, global_[index]);
       if (node.mesh == none) continue;
       if (node.skin != none) {
         VOX_CHECK(add_mesh(node, std::array<Placement, 1>{}));  // its joints say where it is
@@ -90,7 +92,9 @@ class SceneReader {
     }
     for (const std::string& note : document_.notes) builder_.note(note);
     for (const std::string& note : notes_) builder_.note(note);
-    return std::move(builder_).finish();
+    MeshParts parts = std::move(builder_).finish();
+    if (grids_.size() == 1) parts.mesh.grid = std::move(grids_[0]);
+    return parts;
   }
 
  private:
@@ -132,6 +136,17 @@ class SceneReader {
       for (auto child = children.rbegin(); child != children.rend(); ++child) stack.push_back(*child);
     }
     return {};
+  }
+
+  void add_grid(VolumeInfo grid, const Placement& place) {
+    const auto turned = [&](const Affine::Vector& v) { return place.linear * glm::dvec3(v[0], v[1], v[2]); };
+    for (Affine::Vector& axis : grid.affine.axes) {
+      const glm::dvec3 to = turned(axis);
+      axis = {to.x, to.y, to.z};
+    }
+    const glm::dvec3 at = turned(grid.affine.origin) + place.shift;
+    grid.affine.origin = {at.x, at.y, at.z};
+    if (grid.affine.is_valid()) grids_.push_back(std::move(grid));
   }
 
   Result<std::vector<Placement>> instances_of(const Node::Instances& instances, const Placement& outer) {
@@ -242,22 +257,25 @@ class SceneReader {
       VOX_CHECK(builder_.add_vertex(vertex));
     }
     const auto corner = [&](size_t i) { return first + geometry.corners[i]; };
+    // The other side of triangles is the front where they are mirrored.
+    const bool mirrored = glm::determinant(place.linear) < 0;
+    const auto add = [&](uint32_t a, uint32_t b, uint32_t c) {
+      return mirrored ? builder_.add_triangle(a, c, b, material) : builder_.add_triangle(a, b, c, material);
+    };
     const size_t count = geometry.corners.size();
     switch (mode) {
       case 0:
         for (size_t i = 0; i < count; ++i) VOX_CHECK(builder_.add_point(corner(i), material));
         break;
       case 4:
-        for (size_t i = 0; i + 2 < count; i += 3)
-          VOX_CHECK(builder_.add_triangle(corner(i), corner(i + 1), corner(i + 2), material));
+        for (size_t i = 0; i + 2 < count; i += 3) VOX_CHECK(add(corner(i), corner(i + 1), corner(i + 2)));
         break;
       case 5:
         for (size_t i = 2; i < count; ++i)
-          VOX_CHECK(builder_.add_triangle(corner(i - 2 + i % 2), corner(i - 1 - i % 2), corner(i), material));
+          VOX_CHECK(add(corner(i - 2 + i % 2), corner(i - 1 - i % 2), corner(i)));
         break;
       default:
-        for (size_t i = 2; i < count; ++i)
-          VOX_CHECK(builder_.add_triangle(corner(0), corner(i - 1), corner(i), material));
+        for (size_t i = 2; i < count; ++i) VOX_CHECK(add(corner(0), corner(i - 1), corner(i)));
     }
     return {};
   }
@@ -303,6 +321,7 @@ class SceneReader {
   Context& ctx_;
   MeshBuilder builder_;
   std::vector<Placement> global_;
+  std::vector<VolumeInfo> grids_;
   std::vector<uint32_t> order_;
   std::map<uint32_t, uint32_t> materials_;
   std::set<std::string> notes_;

@@ -6,11 +6,13 @@
 #include <glm/vec2.hpp>
 #include <glm/vec3.hpp>
 #include <glm/vec4.hpp>
+#include <optional>
 #include <string>
 #include <vector>
 
 #include "formats/mesh/picture.h"
 #include "formats/reservation.h"
+#include "formats/volume.h"
 
 namespace voxkit {
 
@@ -68,6 +70,8 @@ struct Mesh {
   std::vector<MeshPoint> points;
   std::vector<MeshMaterial> materials;
   std::vector<Picture> pictures;
+  /// The grid of voxels whose faces these are, as the file says (voxel_grid.h); in the mesh's coordinates.
+  std::optional<VolumeInfo> grid;
   std::vector<std::string> notes;  ///< what the file says and the mesh cannot, a sentence each
   std::vector<Reservation> memory;
 };

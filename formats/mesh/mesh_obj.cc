@@ -9,6 +9,7 @@
 #include "formats/mapped_file.h"
 #include "formats/mesh/mesh_builder.h"
 #include "formats/mesh/text_statements.h"
+#include "formats/mesh/voxel_grid.h"
 
 namespace voxkit {
 namespace {
@@ -40,7 +41,9 @@ class ObjReader {
     if (lacks_uvs_)
       builder_.note("dropped: numbers of texture coordinates at corners: the file has no such coordinates");
     if (too_bright_) builder_.note("colors of vertices are above 1: they are taken as 1");
-    return std::move(builder_).finish();
+    MeshParts parts = std::move(builder_).finish();
+    parts.mesh.grid = std::move(grid_);
+    return parts;
   }
 
  private:
@@ -68,9 +71,17 @@ class ObjReader {
         uvs_.values.push_back(glm::vec2(uv[0], uv[1]));
       } else if (keyword == "mtllib") {
         VOX_CHECK(read_libraries(lines.rest()));
+      } else if (keyword.empty() && !grid_) {
+        read_grid(lines.rest());
       }
     }
     return {};
+  }
+
+  /// A comment that says of which voxels these are the faces.
+  void read_grid(std::string_view comment) {
+    static const std::string begin = fmt::format("# {} ", voxel_grid_name);
+    if (comment.starts_with(begin)) grid_ = parse_voxel_grid(comment.substr(begin.size()));
   }
 
   /// x y z, x y z w, x y z r g b, or with a, too.
@@ -298,6 +309,7 @@ class ObjReader {
   CountedList<glm::vec4> colors_;  ///< of the first vertices; the others are white
   MaterialLibrary library_;
   std::set<std::string> read_, dropped_, unknown_;
+  std::optional<VolumeInfo> grid_;
   bool too_bright_ = false, faint_ = false;  ///< that some color is
   bool lacks_uvs_ = false;  ///< corners have numbers of texture coordinates, the file has none
 

@@ -3,11 +3,11 @@
 #include <fmt/format.h>
 
 #include <algorithm>
-#include <cmath>
 #include <mutex>
 #include <utility>
 
 #include "formats/reservation.h"
+#include "libcolor/surface/mesh_grid.h"
 #include "libcolor/surface/surface_batches.h"
 #include "libcolor/surface/voxelise_tile.h"
 
@@ -117,52 +117,6 @@ class MeshSurface : public SurfaceSource {
   std::vector<std::unique_ptr<TileWork>> idle_;
 };
 
-/// Extents and place of the grid; a corner p is at (p - lo) * scale in steps of 2^-8 voxel.
-struct Grid {
-  VolumeInfo info;
-  glm::dvec3 lo{0};
-  double scale = 0;
-};
-
-Grid fit(const Mesh& mesh, int64_t resolution) {
-  Grid grid;
-  glm::dvec3 hi(-INFINITY);
-  grid.lo = glm::dvec3(INFINITY);
-  const auto enclose = [&](uint32_t vertex) {
-    for (int c = 0; c < 3; ++c) {
-      grid.lo[c] = std::min(grid.lo[c], mesh.positions[vertex][c]);
-      hi[c] = std::max(hi[c], mesh.positions[vertex][c]);
-    }
-  };
-  for (const MeshTriangle& triangle : mesh.triangles)
-    for (const uint32_t v : triangle.vertices) enclose(v);
-  for (const MeshPoint& point : mesh.points) enclose(point.vertex);
-  const glm::dvec3 size = hi - grid.lo;
-  const double longest = std::max({size.x, size.y, size.z});
-  const double edge = longest > 0 ? longest / static_cast<double>(resolution) : 1;  // else a single point
-  grid.scale = longest > 0 ? static_cast<double>(resolution * 256) / longest : 256;
-  grid.info.format = VoxelFormat::rgba32;
-  for (int c = 0; c < 3; ++c) {
-    const auto steps = static_cast<int64_t>(std::llround(size[c] * grid.scale));
-    grid.info.dims[c] = std::clamp<int64_t>((steps + 255) / 256, 1, resolution);
-    grid.info.affine.axes[static_cast<size_t>(c)][static_cast<size_t>(c)] = edge;
-    grid.info.affine.origin[static_cast<size_t>(c)] = grid.lo[c] + edge / 2;
-  }
-  return grid;
-}
-
-SnappedTriangle snap(const Mesh& mesh, const MeshTriangle& triangle, const Grid& grid) {
-  SnappedTriangle out;
-  for (size_t i = 0; i < 3; ++i)
-    for (int c = 0; c < 3; ++c) {
-      const double place = (mesh.positions[triangle.vertices[i]][c] - grid.lo[c]) * grid.scale;
-      const auto last = static_cast<double>(grid.info.dims[c] * 256 - 1);
-      out.corners[i][static_cast<size_t>(c)] =
-          2 * static_cast<int32_t>(std::clamp(std::floor(place), 0.0, last)) + 1;
-    }
-  return out;
-}
-
 /// What is not kept of opacity and emission.
 Remarks remarks_of(const Mesh& mesh, bool emission) {
   Remarks out;
@@ -189,16 +143,33 @@ Remarks remarks_of(const Mesh& mesh, bool emission) {
   return out;
 }
 
+/// The mesh's own grid, where it has one and no other is asked for.
+MeshGrid grid_of(const Mesh& mesh, const VoxeliseOptions& options, Remarks& remarks) {
+  if (mesh.grid) {
+    const Index3 dims = mesh.grid->dims;
+    const auto own = MeshGrid::own(mesh);
+    if (!own) {
+      remarks.notes.push_back(fmt::format("its grid of {} x {} x {} voxels is not around all of it: dropped",
+                                          dims.x, dims.y, dims.z));
+    } else if (!options.resolution || *options.resolution == std::max({dims.x, dims.y, dims.z})) {
+      remarks.notes.push_back(
+          fmt::format("faces of voxels: their own grid of {} x {} x {} is taken", dims.x, dims.y, dims.z));
+      return *own;
+    }
+  }
+  return MeshGrid::around(mesh, options.resolution.value_or(default_resolution));
+}
+
 }  // namespace
 
 Result<std::unique_ptr<SurfaceSource>> make_surface(Mesh mesh, const VoxeliseOptions& options, Context& ctx) {
-  if (options.resolution < 1 || options.resolution > int64_t{1} << most_levels)
+  if (options.resolution && (*options.resolution < 1 || *options.resolution > int64_t{1} << most_levels))
     return bad_usage(
-        fmt::format("a resolution of {}: expected 1 to {}", options.resolution, int64_t{1} << most_levels));
+        fmt::format("a resolution of {}: expected 1 to {}", *options.resolution, int64_t{1} << most_levels));
   const uint64_t parts = uint64_t{mesh.triangles.size()} + mesh.points.size();
   if (parts == 0 || parts > UINT32_MAX) return bad_input({}, "a mesh without triangles, or of 2^32 or more");
   Remarks remarks = remarks_of(mesh, options.emission);
-  const Grid grid = fit(mesh, options.resolution);
+  const MeshGrid grid = grid_of(mesh, options, remarks);
   // Corners, and the numbers of triangles in the lists of the largest cubes; points as triangles.
   const uint64_t as_triangles = mesh.points.empty() ? 0 : parts * sizeof(MeshTriangle);
   VOX_TRY(Reservation memory,
@@ -211,7 +182,7 @@ Result<std::unique_ptr<SurfaceSource>> make_surface(Mesh mesh, const VoxeliseOpt
   for (const auto& [vertex, material] : mesh.points)
     mesh.triangles.push_back({{vertex, vertex, vertex}, material});
   scene.corners.reserve(parts);
-  for (const MeshTriangle& triangle : mesh.triangles) scene.corners.push_back(snap(mesh, triangle, grid));
+  for (const MeshTriangle& triangle : mesh.triangles) scene.corners.push_back(grid.snap(mesh, triangle));
 
   // One set of levels for a picture that is opaque and one where it is not.
   std::vector<std::array<int32_t, 2>> known(mesh.pictures.size(), {-1, -1});
@@ -239,7 +210,7 @@ Result<std::unique_ptr<SurfaceSource>> make_surface(Mesh mesh, const VoxeliseOpt
   mesh.pictures.clear();
   mesh.positions = {};
   scene.mesh = std::move(mesh);
-  return std::make_unique<MeshSurface>(std::move(scene), grid.info, options.tile_bits, std::move(memory),
+  return std::make_unique<MeshSurface>(std::move(scene), grid.info(), options.tile_bits, std::move(memory),
                                        std::move(remarks));
 }
 

@@ -2,6 +2,7 @@
 #pragma once
 
 #include <memory>
+#include <optional>
 
 #include "formats/mesh/mesh.h"
 #include "libcolor/surface/surface.h"
@@ -9,10 +10,15 @@
 
 namespace voxkit::color {
 
+/// Voxels along the longest side where nothing else is said.
+inline constexpr int64_t default_resolution = 1024;
+
 /// How a mesh becomes voxels.
 struct VoxeliseOptions {
   /// Voxels along the longest side of the mesh's box, 1 to 2^21: a voxel's edge is that side divided by it.
-  int64_t resolution = 1024;
+  /// Not said: the mesh's own grid, where it is inside one (mesh_grid.h), else default_resolution. Where it
+  /// is that of its own grid, that is taken, too.
+  std::optional<int64_t> resolution;
   SurfaceKind kind = SurfaceKind::thin;
   /// Voxels along the side of the cubes that the work is split into, as a power of two, 0 to 8. The result
   /// does not depend on it.

@@ -28,6 +28,7 @@ libcolor/terrain  -> formats libcolor/surface
 libcolor/terms    -> formats libcolor/surface
 libcolor/dag      -> formats libcolor/surface libcolor/terms
 libcolor/octree   -> formats libpage libcolor/surface libcolor/terms libcolor/dag
+libcolor/faces    -> formats formats/mesh libcolor/surface
 libcolor/blocks   -> formats libcolor/surface libcolor/terms
 libcolor/palette  -> formats libcolor/surface libcolor/terms libcolor/blocks
 libcolor/textures -> formats formats/image libcolor/surface libcolor/terms libcolor/blocks

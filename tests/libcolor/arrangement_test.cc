@@ -305,7 +305,7 @@ TEST(Arrangement, NodesWithoutOctantsAreFoundAtOnce) {
   EXPECT_TRUE(refused(volume->check(reading.ctx)));
   EXPECT_TRUE(refused(volume->for_each_voxel(nowhere, reading.ctx)));
   EXPECT_TRUE(refused(surface_of(volume, 3, CellColors::means)->read(reading.ctx, nowhere)));
-  EXPECT_TRUE(refused(level_voxels(*volume, 1)));
+  EXPECT_TRUE(refused(Level(volume, 1).count(level_info(volume->info(), 1).box())));
   EXPECT_TRUE(refused(voxels_in(*volume, {Index3(0), Index3(1 << 19)})));
   std::vector<std::byte> room(8 * 8 * 8 * 4);
   const VoxelSpan span = packed(room.data(), Index3(8), VoxelFormat::rgba32);

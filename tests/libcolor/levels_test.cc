@@ -101,7 +101,7 @@ TEST(Levels, HaveTheMeansOfTheirVoxels) {
           EXPECT_NEAR(color.g, found->second[1], 0.6);
           EXPECT_NEAR(color.b, found->second[2], 0.6);
         }
-        const auto count = level_voxels(*volume, level);
+        const auto count = Level(volume, level).count(level_info(volume->info(), level).box());
         ASSERT_TRUE(count);
         EXPECT_EQ(*count, expected.size());
         // A file without loss has the same colours, if it has any.
@@ -178,7 +178,7 @@ TEST(Levels, OfNothingHaveNothing) {
   ASSERT_TRUE(volume);
   for (int level = 0; level < level_count(volume->info()); ++level) {
     EXPECT_EQ(all_of(*surface_of(volume, level)).size(), 0u);
-    const auto count = level_voxels(*volume, level);
+    const auto count = Level(volume, level).count(level_info(volume->info(), level).box());
     ASSERT_TRUE(count);
     EXPECT_EQ(*count, 0u);
   }

@@ -24,10 +24,12 @@ Surface voxelise(const std::string& name, const SurfaceOptions& options, Context
   color::VoxeliseOptions voxelise;
   voxelise.kind = options.kind;
   voxelise.emission = options.emission;
-  if (options.resolution) voxelise.resolution = *options.resolution;
+  voxelise.resolution = options.resolution;
   if (is_points_name(name)) {
     VOX_TRY(auto points, open_points(name));
-    if (points) return color::surface_of_points(std::move(points), voxelise.resolution, ctx);
+    if (points)
+      return color::surface_of_points(std::move(points),
+                                      options.resolution.value_or(color::default_resolution), ctx);
   }
   VOX_TRY(Mesh mesh, read_mesh(name, ctx, {.allow_outside = options.open.allow_outside}));
   return color::make_surface(std::move(mesh), voxelise, ctx);

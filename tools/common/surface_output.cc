@@ -5,8 +5,10 @@
 
 #include "formats/mesh/magicavoxel.h"
 #include "formats/mesh/ply_points.h"
+#include "formats/mesh/voxel_faces.h"
 #include "formats/reservation.h"
 #include "formats/volume/readers.h"
+#include "libcolor/faces/surface_faces.h"
 #include "libcolor/palette/palette.h"
 #include "libcolor/surface/morton.h"
 
@@ -14,11 +16,6 @@ namespace voxkit::cli {
 namespace {
 
 using Voxels = std::span<const color::SurfaceVoxel>;
-
-std::array<int32_t, 3> place_of(const color::SurfaceVoxel& voxel) {
-  const auto at = color::morton_place(voxel.place);
-  return {static_cast<int32_t>(at.x), static_cast<int32_t>(at.y), static_cast<int32_t>(at.z)};
-}
 
 /// Whether floats move the centres of voxels, somewhere in the volume, by more than they may.
 bool needs_doubles(const VolumeInfo& info) {
@@ -35,85 +32,152 @@ bool needs_doubles(const VolumeInfo& info) {
   return false;
 }
 
-Status write_points(color::SurfaceSource& surface, uint64_t count, const std::string& name, bool force,
-                    Context& ctx) {
-  const VolumeInfo& info = surface.info();
+/// The voxels of a level in a box, in their order there. What they are written as begins at the box's corner.
+class Part {
+ public:
+  Part(const color::Level& level, const Box& box) : level_(level), box_(box), info_(level.info()) {
+    if (box == info_.box()) return;
+    info_.affine = info_.affine.moved_to(
+        {static_cast<double>(box.lo.x), static_cast<double>(box.lo.y), static_cast<double>(box.lo.z)});
+    info_.dims = box.size();
+  }
+  const VolumeInfo& info() const { return info_; }
+  const Box& box() const { return box_; }
+  Status each(const color::SurfaceSource::Sink& sink, Context& ctx) const { return each(box_, sink, ctx); }
+  /// Those in a box of the level.
+  Status each(const Box& box, const color::SurfaceSource::Sink& sink, Context& ctx) const {
+    return box == level_.info().box() ? level_.for_each_voxel(sink, ctx) : level_.for_each_voxel(box, sink);
+  }
+  std::array<int32_t, 3> place(const color::SurfaceVoxel& voxel) const {
+    const Index3 at = Index3(color::morton_place(voxel.place)) - box_.lo;
+    return {static_cast<int32_t>(at.x), static_cast<int32_t>(at.y), static_cast<int32_t>(at.z)};
+  }
+
+ private:
+  const color::Level& level_;
+  Box box_;
+  VolumeInfo info_;
+};
+
+Status write_points(const Part& part, uint64_t count, const std::string& name, bool force, Context& ctx) {
+  const VolumeInfo& info = part.info();
   const bool doubles = needs_doubles(info);
   VOX_TRY(auto writer, PlyPointWriter::create(name, count, doubles, force));
   std::vector<ColoredPoint> points;
-  VOX_CHECK(surface.read(ctx, [&](Voxels voxels) -> Status {
-    points.clear();
-    for (const color::SurfaceVoxel& voxel : voxels) {
-      const auto at = place_of(voxel);
-      const Affine::Vector place = info.affine.place(
-          {static_cast<double>(at[0]), static_cast<double>(at[1]), static_cast<double>(at[2])});
-      ColoredPoint& point = points.emplace_back();
-      point.at = {place[0], place[1], place[2]};
-      point.color = {voxel.color.r, voxel.color.g, voxel.color.b};
-    }
-    return writer.add(points);
-  }));
+  VOX_CHECK(part.each(
+      [&](Voxels voxels) -> Status {
+        points.clear();
+        for (const color::SurfaceVoxel& voxel : voxels) {
+          const auto at = part.place(voxel);
+          const Affine::Vector place = info.affine.place(
+              {static_cast<double>(at[0]), static_cast<double>(at[1]), static_cast<double>(at[2])});
+          ColoredPoint& point = points.emplace_back();
+          point.at = {place[0], place[1], place[2]};
+          point.color = {voxel.color.r, voxel.color.g, voxel.color.b};
+        }
+        return writer.add(points);
+      },
+      ctx));
   return writer.finish();
 }
 
-Status write_grid(color::SurfaceSource& surface, const std::string& name, bool force, Context& ctx) {
-  VOX_TRY(auto sink, create_vdb_voxels(name, surface.info(), force, ctx));
+Status write_grid(const Part& part, const std::string& name, bool force, Context& ctx) {
+  VOX_TRY(auto sink, create_vdb_voxels(name, part.info(), force, ctx));
   std::vector<ModelVoxel> run;
-  VOX_CHECK(surface.read(ctx, [&](Voxels voxels) -> Status {
-    run.clear();
-    for (const color::SurfaceVoxel& v : voxels)
-      run.push_back({place_of(v), {v.color.r, v.color.g, v.color.b}});
-    return sink->add(run);
-  }));
+  VOX_CHECK(part.each(
+      [&](Voxels voxels) -> Status {
+        run.clear();
+        for (const color::SurfaceVoxel& v : voxels)
+          run.push_back({part.place(v), {v.color.r, v.color.g, v.color.b}});
+        return sink->add(run);
+      },
+      ctx));
   return sink->finish();
 }
 
-Status write_models(color::SurfaceSource& surface, uint64_t count, const std::string& name, bool force,
-                    Context& ctx) {
+Status write_models(const Part& part, uint64_t count, const std::string& name, bool force, Context& ctx) {
   constexpr uint32_t most_colors = 255;
   constexpr int effort = 3;
   // What the file cannot hold is refused before anything is decoded.
-  VOX_CHECK(check_magicavoxel(name, surface.info().dims, count));
+  VOX_CHECK(check_magicavoxel(name, part.info().dims, count));
   color::Palette palette;
   {
     VOX_TRY(const Reservation memory,
             Reservation::take(count * sizeof(color::Rgb), "the colors of a surface", ctx));
     std::vector<color::Rgb> colors;
     colors.reserve(count);
-    VOX_CHECK(surface.read(ctx, [&](Voxels voxels) -> Status {
-      for (const color::SurfaceVoxel& v : voxels) colors.push_back(v.color);
-      return {};
-    }));
+    VOX_CHECK(part.each(
+        [&](Voxels voxels) -> Status {
+          for (const color::SurfaceVoxel& v : voxels) colors.push_back(v.color);
+          return {};
+        },
+        ctx));
     VOX_TRY(palette, color::Palette::choose(colors, most_colors, effort, ctx));
   }
   std::vector<std::array<uint8_t, 3>> chosen;
   for (const color::Rgb& c : palette.colors()) chosen.push_back({c.r, c.g, c.b});
-  VOX_TRY(auto writer, create_magicavoxel(name, surface.info(), count, chosen, force, ctx));
+  VOX_TRY(auto writer, create_magicavoxel(name, part.info(), count, chosen, force, ctx));
   std::vector<IndexedVoxel> run;
-  VOX_CHECK(surface.read(ctx, [&](Voxels voxels) -> Status {
-    run.clear();
-    for (const color::SurfaceVoxel& v : voxels)
-      run.push_back({place_of(v), static_cast<uint8_t>(palette.index_of(v.color))});
-    return writer->add(run);
-  }));
+  VOX_CHECK(part.each(
+      [&](Voxels voxels) -> Status {
+        run.clear();
+        for (const color::SurfaceVoxel& v : voxels)
+          run.push_back({part.place(v), static_cast<uint8_t>(palette.index_of(v.color))});
+        return writer->add(run);
+      },
+      ctx));
+  return writer->finish();
+}
+
+Status write_mesh(const Part& part, bool enclosed, SurfaceCount& count, const std::string& name, bool force,
+                  Context& ctx) {
+  VOX_TRY(const auto writer, create_faces(name, part.info(), force, ctx));
+  Context reading = ctx;
+  reading.progress = [](double) {};  // of the faces it is told
+  VOX_CHECK(color::surface_faces(
+      part.box(),
+      [&](const Box& box, const color::SurfaceSource::Sink& sink) { return part.each(box, sink, reading); },
+      {[&](std::span<const FaceRectangle> faces) {
+         count.faces += faces.size();
+         return writer->add(faces);
+       },
+       [&](std::span<const ModelVoxel> voxels) {
+         count.enclosed += voxels.size();
+         return enclosed ? writer->add_enclosed(voxels) : Status{};
+       }},
+      ctx));
   return writer->finish();
 }
 
 }  // namespace
 
 bool is_only_surface_output(const std::string& name) {
-  return has_ending(name, ".ply") || has_ending(name, ".vox");
+  return has_ending(name, ".ply") || has_ending(name, ".vox") || is_face_output(name);
 }
 
 bool is_surface_output(const std::string& name) {
   return is_only_surface_output(name) || has_ending(name, ".vdb");
 }
 
-Status write_surface(color::SurfaceSource& surface, uint64_t count, const std::string& name, bool force,
-                     Context& ctx) {
-  if (has_ending(name, ".ply")) return write_points(surface, count, name, force, ctx);
-  if (has_ending(name, ".vdb")) return write_grid(surface, name, force, ctx);
-  return write_models(surface, count, name, force, ctx);
+std::vector<std::string> files_of_surface(const std::string& name) {
+  return files_of_faces(name);
+}
+
+Result<SurfaceCount> write_surface(const color::Level& level, const SurfaceOutput& what,
+                                   const std::string& name, bool force, Context& ctx) {
+  const Part part(level, what.box);
+  SurfaceCount count;
+  VOX_TRY(count.voxels, level.count(what.box));
+  if (is_face_output(name)) {
+    VOX_CHECK(write_mesh(part, what.enclosed, count, name, force, ctx));
+  } else if (has_ending(name, ".ply")) {
+    VOX_CHECK(write_points(part, count.voxels, name, force, ctx));
+  } else if (has_ending(name, ".vdb")) {
+    VOX_CHECK(write_grid(part, name, force, ctx));
+  } else {
+    VOX_CHECK(write_models(part, count.voxels, name, force, ctx));
+  }
+  return count;
 }
 
 }  // namespace voxkit::cli
