@@ -88,17 +88,6 @@ std::string random_suffix() {
   return suffix;
 }
 
-/// A name is as durable as the data only once its folder is on disk; file systems that cannot do that say
-/// EINVAL.
-Status flush_folder(const std::string& name, const std::string& target) {
-  const int folder = open(folder_of(target).c_str(), O_RDONLY | O_DIRECTORY | O_CLOEXEC);
-  if (folder < 0) return {};
-  const bool failed = fsync(folder) != 0 && errno == EIO;
-  close(folder);
-  if (failed) return output_error(name, "its folder cannot be flushed to disk: Input/output error");
-  return {};
-}
-
 /// What a name means as an output.
 enum class Kind { standard_output, through, file };
 
@@ -245,28 +234,46 @@ Status OutputFile::give_name() {
   if (renamed != 0) return system_error(name_, "cannot be given its name", errno);
   forget(temporary_);
   temporary_.clear();
-
   named_ = true;
-  return flush_folder(name_, target);
+  return {};
 }
 
 Status OutputFile::commit() {
   VOX_CHECK(complete());
-  return give_name();
+  VOX_CHECK(give_name());
+  return flush_folder();
 }
 
 Status OutputFile::swap_in() {
   if (!force_ || temporary_.empty()) return give_name();
   const std::string target = resolve(name_);
-  swapped_ = renameat2(AT_FDCWD, temporary_.c_str(), AT_FDCWD, target.c_str(), RENAME_EXCHANGE) == 0;
-  return swapped_ ? flush_folder(name_, target) : give_name();
+  struct stat old;
+  const bool replaces = stat(target.c_str(), &old) == 0 && S_ISREG(old.st_mode);
+  swapped_ = replaces &&
+             renameat2(AT_FDCWD, temporary_.c_str(), AT_FDCWD, target.c_str(), RENAME_EXCHANGE) == 0;
+  if (swapped_) return {};
+  // A file system that knows no RENAME_EXCHANGE: the old file is gone, so the new one stays.
+  lasts_ = replaces;
+  return give_name();
+}
+
+/// A name is as durable as the data only once its folder is on disk; file systems that cannot do that say
+/// EINVAL.
+Status OutputFile::flush_folder() {
+  if (!named_ && !swapped_) return {};
+  const int folder = open(folder_of(resolve(name_)).c_str(), O_RDONLY | O_DIRECTORY | O_CLOEXEC);
+  if (folder < 0) return {};
+  const bool failed = fsync(folder) != 0 && errno == EIO;
+  close(folder);
+  if (failed) return output_error(name_, "its folder cannot be flushed to disk: Input/output error");
+  return {};
 }
 
 void OutputFile::swap_out() {
   const std::string target = resolve(name_);
   if (swapped_)
     renameat2(AT_FDCWD, temporary_.c_str(), AT_FDCWD, target.c_str(), RENAME_EXCHANGE);
-  else if (named_)
+  else if (named_ && !lasts_)
     unlink(target.c_str());
 }
 
@@ -277,7 +284,9 @@ Status commit_together(std::span<const std::unique_ptr<OutputFile>> files) {
       for (size_t done = i + 1; done-- > 0;) files[done]->swap_out();
       return named;
     }
-  return {};  // old files go with their temporary names
+  // Old files go with their temporary names.
+  for (const auto& file : files) VOX_CHECK(file->flush_folder());
+  return {};
 }
 
 }  // namespace voxkit

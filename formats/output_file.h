@@ -41,11 +41,12 @@ class OutputFile {
   /// Permissions, the disk, and no more writing: what is left is the name.
   Status complete();
   Status give_name();
+  Status flush_folder();
   /// The same, but an old file of that name changes places with the new one; and back.
   Status swap_in();
   void swap_out();
   int fd_ = -1;
-  bool force_ = false, named_ = false, swapped_ = false;
+  bool force_ = false, named_ = false, swapped_ = false, lasts_ = false;
   uint64_t position_ = 0;
   std::string name_, temporary_;
 };

@@ -107,13 +107,22 @@ void note_materials(const Json& file, Document& document) {
     }
     return false;
   };
+  // No metal and full roughness are what is left of a material that has nothing but its color.
+  const auto says_other = [&](const char* factor, double of_color) {
+    for (const Json& material : list_of(file, "materials")) {
+      const auto at = material.is_object() ? material.find("pbrMetallicRoughness") : material.end();
+      if (!material.is_object() || at == material.end() || !at->is_object()) continue;
+      const auto value = at->find(factor);
+      if (value != at->end() && !(value->is_number() && value->get<double>() == of_color)) return true;
+    }
+    return false;
+  };
   std::string dropped;
   const auto add = [&](const char* what) { dropped += (dropped.empty() ? "" : ", ") + std::string(what); };
   if (any("normalTexture", nullptr)) add("normal maps");
   if (any("occlusionTexture", nullptr)) add("occlusion maps");
   if (any("pbrMetallicRoughness", "metallicRoughnessTexture")) add("maps of metal and roughness");
-  if (any("pbrMetallicRoughness", "metallicFactor") || any("pbrMetallicRoughness", "roughnessFactor"))
-    add("metal and roughness");
+  if (says_other("metallicFactor", 0) || says_other("roughnessFactor", 1)) add("metal and roughness");
   if (!dropped.empty()) document.notes.push_back(fmt::format("dropped: {}: only colors are kept", dropped));
 }
 

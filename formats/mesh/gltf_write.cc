@@ -237,8 +237,7 @@ class GlbWriter final : public FaceWriter {
     all["meshes"] = std::move(meshes);
     all["materials"] = Json::array(
         {{{"name", "palette"},
-          {"pbrMetallicRoughness",
-           {{"baseColorTexture", {{"index", 0}}}, {"metallicFactor", 0}, {"roughnessFactor", 1}}}}});
+          {"pbrMetallicRoughness", {{"baseColorTexture", {{"index", 0}}}, {"metallicFactor", 0}}}}});
     all["textures"] = Json::array({{{"sampler", 0}, {"source", 0}}});
     all["samplers"] = Json::array({{{"magFilter", nearest},
                                     {"minFilter", nearest},

@@ -3,14 +3,21 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <array>
 #include <iterator>
+#include <unordered_map>
 
 #include "formats/mesh/face_files.h"
 #include "formats/mesh/voxel_grid.h"
 #include "formats/output_file.h"
+#include "formats/reservation.h"
 
 namespace voxkit {
 namespace {
+
+/// Corners of a plane that are remembered, and bytes that two planes take.
+constexpr size_t most_corners = size_t{1} << 18;
+constexpr uint64_t corner_bytes = 2 * 48 * most_corners;
 
 /// The last part of a path.
 std::string name_in_folder(const std::string& path) {
@@ -19,8 +26,9 @@ std::string name_in_folder(const std::string& path) {
 
 class ObjWriter final : public FaceWriter {
  public:
-  ObjWriter(const VolumeInfo& info, std::vector<std::unique_ptr<OutputFile>> files, Context& ctx)
-      : files_(std::move(files)), ctx_(ctx), info_(info) {}
+  ObjWriter(const VolumeInfo& info, std::vector<std::unique_ptr<OutputFile>> files, Reservation memory,
+            Context& ctx)
+      : files_(std::move(files)), memory_(std::move(memory)), ctx_(ctx), info_(info) {}
 
   Status add(std::span<const FaceRectangle> faces) override { return spool_.add(faces); }
   Status add_enclosed(std::span<const ModelVoxel> voxels) override { return spool_.add_enclosed(voxels); }
@@ -55,15 +63,14 @@ class ObjWriter final : public FaceWriter {
   Status put_faces() {
     // Seen from outside corners turn counterclockwise, also where the volume's axes are mirrored.
     const bool turn_about = info_.affine.determinant() < 0;
-    uint64_t number = 1;
     return spool_.each_face([&](std::span<const FaceRectangle> faces) -> Status {
       for (const FaceRectangle& face : faces) {
         auto corners = corners_of(face);
         if (turn_about) std::reverse(corners.begin(), corners.end());
-        for (const auto& corner : corners) add_vertex({corner[0] - 0.5, corner[1] - 0.5, corner[2] - 0.5});
-        const uint32_t color = spool_.palette().index_of(face.color) + 1;
-        add_text("f {0}/{4} {1}/{4} {2}/{4} {3}/{4}\n", number, number + 1, number + 2, number + 3, color);
-        number += 4;
+        std::array<uint64_t, 4> numbers;
+        for (size_t i = 0; i < 4; ++i) numbers[i] = number_of(corners[i], face);
+        add_text("f {0}/{4} {1}/{4} {2}/{4} {3}/{4}\n", numbers[0], numbers[1], numbers[2], numbers[3],
+                 spool_.palette().index_of(face.color) + 1);
         VOX_CHECK(flush_if_full());
       }
       return {};
@@ -72,19 +79,33 @@ class ObjWriter final : public FaceWriter {
 
   Status put_points() {
     add_text("o enclosed\n");
-    uint64_t number = 4 * spool_.faces() + 1;
     return spool_.each_enclosed([&](std::span<const ModelVoxel> voxels) -> Status {
       for (const ModelVoxel& voxel : voxels) {
         add_vertex({static_cast<double>(voxel.place[0]), static_cast<double>(voxel.place[1]),
                     static_cast<double>(voxel.place[2])});
-        add_text("p {}/{}\n", number++, spool_.palette().index_of(voxel.color) + 1);
+        add_text("p {}/{}\n", vertices_, spool_.palette().index_of(voxel.color) + 1);
         VOX_CHECK(flush_if_full());
       }
       return {};
     });
   }
 
+  /// The number of a vertex at a corner: one that is there already, of a face beside this one.
+  uint64_t number_of(const std::array<int32_t, 3>& corner, const FaceRectangle& face) {
+    Plane& plane = planes_[face.positive];
+    if (plane.axis != face.axis || plane.place != face.plane || plane.numbers.size() >= most_corners) {
+      plane.axis = face.axis;
+      plane.place = face.plane;
+      plane.numbers.clear();
+    }
+    const auto u = static_cast<uint32_t>(corner[(face.axis + 1) % 3]);
+    const auto v = static_cast<uint32_t>(corner[(face.axis + 2) % 3]);
+    const auto [at, is_new] = plane.numbers.try_emplace(uint64_t{v} << 32 | u, vertices_ + 1);
+    if (is_new) add_vertex({corner[0] - 0.5, corner[1] - 0.5, corner[2] - 0.5});
+    return at->second;
+  }
   void add_vertex(const Affine::Vector& index) {
+    ++vertices_;
     const Affine::Vector at = info_.affine.place(index);
     // The shortest digits from which the same doubles are read.
     add_text("v {} {} {}\n", at[0], at[1], at[2]);
@@ -101,10 +122,19 @@ class ObjWriter final : public FaceWriter {
   }
 
   std::vector<std::unique_ptr<OutputFile>> files_;  ///< the mesh, its library, its texture
+  Reservation memory_;
   Context& ctx_;
   VolumeInfo info_;
   FaceSpool spool_;
   std::string text_;
+  uint64_t vertices_ = 0;  ///< so many are written
+  /// Vertices of faces that look to one side, by their places in the plane that these are in.
+  struct Plane {
+    int axis = -1;
+    int32_t place = 0;
+    std::unordered_map<uint64_t, uint64_t> numbers;
+  };
+  std::array<Plane, 2> planes_;
 };
 
 }  // namespace
@@ -120,7 +150,8 @@ Result<std::unique_ptr<FaceWriter>> create_obj_faces(const std::string& path, co
     VOX_TRY(auto out, OutputFile::create(file, force));
     files.push_back(std::move(out));
   }
-  return std::make_unique<ObjWriter>(info, std::move(files), ctx);
+  VOX_TRY(Reservation memory, Reservation::take(corner_bytes, "corners of a mesh", ctx));
+  return std::make_unique<ObjWriter>(info, std::move(files), std::move(memory), ctx);
 }
 
 }  // namespace voxkit

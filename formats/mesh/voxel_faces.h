@@ -45,12 +45,13 @@ bool is_face_output(const std::string& name);
 /// The files of that name: of x.obj also x.mtl and x.png.
 std::vector<std::string> files_of_faces(const std::string& name);
 
-/// Starts a mesh of the voxels of a volume, of which `info` gives extents and place: triangles in the
-/// volume's world, and one texture, of NEAREST texels, one for each colour, so that colours are exact and
-/// need no more than this one file
-/// (.glb), or these three (.obj, .mtl, .png). Each rectangle has corners of its own. The volume's grid is
-/// written into the file (voxel_grid.h). Memory: 50 MiB and 2 times the texture, of 3 bytes a colour;
-/// rectangles go through a file in $TMPDIR, 28 bytes each. What the file cannot hold is said (ctx.note).
+/// Starts a mesh of the voxels of a volume, of which `info` gives extents and place: triangles, or in .obj
+/// files polygons of four corners, in the volume's world, and one texture, of NEAREST texels, one for each
+/// colour, so that colours are exact and need no more than this one file (.glb), or these three (.obj, .mtl,
+/// .png). Each rectangle has corners of its own; in .obj files those in one plane share them as long as there
+/// are not too many. The volume's grid is written into the file (voxel_grid.h). Memory: 30 MiB, and 22 bytes
+/// a texel of the texture; rectangles go through a file in $TMPDIR, 28 bytes each, and enclosed voxels, 16.
+/// What the file cannot hold is said (ctx.note).
 ///
 /// Errors: ErrorCode::usage for a name that is none, or that a line of text cannot hold, or where there is no
 /// library for PNG; ErrorCode::output; ErrorCode::limit where a .glb file would be larger than 4 GiB.

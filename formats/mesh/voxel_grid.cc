@@ -67,7 +67,8 @@ std::optional<VolumeInfo> gltf::voxel_grid_of(const Json& grid) {
   });
   const bool origin = three(
       grid, "origin", [&](size_t c, const Json& value) { return finite(value, info.affine.origin[c]); });
-  if (!sides || !axes || !origin || !info.affine.is_valid()) return std::nullopt;
+  if (!sides || !axes || !origin || !info.affine.is_valid() || !checked_voxels(info.dims))
+    return std::nullopt;
   const std::string world = words(grid, "world");
   for (int w = 0; w <= static_cast<int>(World::left_handed); ++w)
     if (name(static_cast<World>(w)) == world) info.world = static_cast<World>(w);

@@ -170,6 +170,11 @@ Result<std::unique_ptr<SurfaceSource>> make_surface(Mesh mesh, const VoxeliseOpt
   if (parts == 0 || parts > UINT32_MAX) return bad_input({}, "a mesh without triangles, or of 2^32 or more");
   Remarks remarks = remarks_of(mesh, options.emission);
   const MeshGrid grid = grid_of(mesh, options, remarks);
+  const Index3 dims = grid.info().dims;
+  if (!checked_voxels(dims))
+    return bad_usage(
+        fmt::format("a grid of {} x {} x {} voxels: expected at most 2^62: use a lower resolution", dims.x,
+                    dims.y, dims.z));
   // Corners, and the numbers of triangles in the lists of the largest cubes; points as triangles.
   const uint64_t as_triangles = mesh.points.empty() ? 0 : parts * sizeof(MeshTriangle);
   VOX_TRY(Reservation memory,

@@ -18,7 +18,7 @@ struct VoxeliseOptions {
   /// Voxels along the longest side of the mesh's box, 1 to 2^21: a voxel's edge is that side divided by it.
   /// Not said: the mesh's own grid, where it is inside one (mesh_grid.h), else default_resolution. Where it
   /// is that of its own grid, that is taken, too.
-  std::optional<int64_t> resolution;
+  std::optional<int64_t> resolution = {};
   SurfaceKind kind = SurfaceKind::thin;
   /// Voxels along the side of the cubes that the work is split into, as a power of two, 0 to 8. The result
   /// does not depend on it.

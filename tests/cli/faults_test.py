@@ -44,6 +44,8 @@ OUTPUTS = {
     "dagc as dagc": ("vox-convert", ["@/a.dagc", "--crop", "1,1,1,63,17,64"], "b.dagc"),
     "dagc as ply": ("vox-decode", ["@/a.dagc"], "a.ply"),
     "dagc as vox": ("vox-decode", ["@/a.dagc"], "a.vox"),
+    "dagc as glb": ("vox-decode", ["@/a.dagc"], "a.glb"),
+    "dagc as obj": ("vox-decode", ["@/a.dagc"], "a.obj"),
     "dagc as vdb": ("vox-decode", ["@/a.dagc"], "a.vdb"),
     "tiles": ("vox-decode", ["@/png.dagc", "--tiles"], "t-%02d.png"),
     "error volume": ("voxdiff", ["@/a.nrrd", "@/b.nrrd"], "e.nrrd"),

@@ -161,5 +161,54 @@ TEST_F(OutputFileTest, SignalHandlersRemoveTemporaries) {
   EXPECT_EQ(files(), 0);
 }
 
+TEST_F(OutputFileTest, SeveralHaveTheirNamesTogetherOrNone) {
+  const auto begin = [&](const std::vector<std::string>& names, bool force) {
+    std::vector<std::unique_ptr<OutputFile>> files;
+    for (const std::string& name : names) {
+      auto file = OutputFile::create(path(name), force);
+      EXPECT_TRUE(file);
+      EXPECT_TRUE((*file)->write("new " + name));
+      files.push_back(std::move(*file));
+    }
+    return files;
+  };
+  {
+    const auto files = begin({"a", "b", "c"}, false);
+    ASSERT_TRUE(commit_together(files));
+  }
+  EXPECT_EQ(get(path("a")) + get(path("b")) + get(path("c")), "new anew bnew c");
+  EXPECT_EQ(files(), 3);
+
+  // The second cannot have its name: somebody made a file of it.
+  {
+    const auto files = begin({"d", "e", "f"}, false);
+    put("e", "theirs");
+    const Status status = commit_together(files);
+    ASSERT_FALSE(status);
+    EXPECT_EQ(status.error().code, ErrorCode::output);
+    EXPECT_FALSE(fs::exists(path("d")));
+  }
+  EXPECT_FALSE(fs::exists(path("d")) || fs::exists(path("f")));
+  EXPECT_EQ(get(path("e")), "theirs");
+  EXPECT_EQ(files(), 4);
+
+  // With force old files are back: a folder has the name of the last.
+  put("a", "old a");
+  {
+    const auto files = begin({"a", "g", "h"}, true);
+    fs::create_directories(path("h/inside"));
+    ASSERT_FALSE(commit_together(files));
+  }
+  EXPECT_EQ(get(path("a")), "old a");
+  EXPECT_FALSE(fs::exists(path("g")));
+  EXPECT_TRUE(fs::is_directory(path("h/inside")));
+  {
+    const auto files = begin({"a", "b"}, true);
+    ASSERT_TRUE(commit_together(files));
+  }
+  EXPECT_EQ(get(path("a")), "new a");
+  EXPECT_EQ(files(), 5);
+}
+
 }  // namespace
 }  // namespace voxkit

@@ -8,6 +8,10 @@
 namespace voxkit::fuzz {
 namespace {
 
+const std::string grid =
+    R"({"dims":[3,4,5],"axes":[[1,0,0],[0,1,0],[0,0,2]],"origin":[0,0,0],"world":"RAS","unit":"mm",)"
+    R"("space_code":1,"description":"d"})";
+
 /// With nodes, colours, a material with a picture transform, and an accessor that is partly zeros.
 GltfSquare rich_square() {
   GltfSquare file;
@@ -21,7 +25,8 @@ GltfSquare rich_square() {
   file.views =
       R"(,{"buffer":0,"byteOffset":92,"byteLength":48},{"buffer":0,"byteOffset":140,"byteLength":2},)"
       R"({"buffer":0,"byteOffset":144,"byteLength":8})";
-  file.nodes = R"([{"mesh":0,"translation":[10,0,0]},{"children":[2],"scale":[2,2,2]},)"
+  file.nodes = R"([{"mesh":0,"translation":[10,0,0],"extras":{"voxel_grid":)" + grid +
+               R"(}},{"children":[2],"scale":[2,2,2]},)"
                R"({"mesh":0,"rotation":[0,0,0.6,0.8]}])";
   file.scene = "[0,1]";
   file.material = R"({"pbrMetallicRoughness":{"baseColorFactor":[0.5,0.25,1,0.75]},"alphaMode":"MASK"})";
@@ -100,7 +105,8 @@ std::vector<std::string> mesh_gltf_seeds() {
 
 std::vector<std::string> mesh_obj_seeds() {
   return {obj_square(), obj_square("o a\ng b\ns 1\nvn 0 0 1\n") + "usemtl x\nf 1//1 -2//1 3//1\nl 1 2\np 1\n",
-          "f 1 2 \\\n3 4 5\nv .5 0 0 1 0 .5\nv 2 1. 0\nv 0 2e0 0\nv 1 1 0 .25\nv +1 -0.5 0\n"};
+          "# voxel_grid " + grid +
+              "\nf 1 2 \\\n3 4 5\nv .5 0 0 1 0 .5\nv 2 1. 0\nv 0 2e0 0\nv 1 1 0 .25\nv +1 -0.5 0\n"};
 }
 
 std::vector<std::string> mesh_stl_seeds() {
