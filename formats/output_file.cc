@@ -249,8 +249,8 @@ Status OutputFile::swap_in() {
   const std::string target = resolve(name_);
   struct stat old;
   const bool replaces = stat(target.c_str(), &old) == 0 && S_ISREG(old.st_mode);
-  swapped_ = replaces &&
-             renameat2(AT_FDCWD, temporary_.c_str(), AT_FDCWD, target.c_str(), RENAME_EXCHANGE) == 0;
+  swapped_ =
+      replaces && renameat2(AT_FDCWD, temporary_.c_str(), AT_FDCWD, target.c_str(), RENAME_EXCHANGE) == 0;
   if (swapped_) return {};
   // A file system that knows no RENAME_EXCHANGE: the old file is gone, so the new one stays.
   lasts_ = replaces;

@@ -80,11 +80,13 @@ class GlbWriter final : public FaceWriter {
   Status add(std::span<const FaceRectangle> faces) override {
     for (const FaceRectangle& face : faces)
       for (const auto& corner : corners_of(face)) surface_.enclose(place_of(corner));
-    return spool_.add(faces);
+    VOX_CHECK(spool_.add(faces));
+    return check_size(face_bytes * spool_.faces());
   }
   Status add_enclosed(std::span<const ModelVoxel> voxels) override {
     for (const ModelVoxel& voxel : voxels) enclosed_.enclose(centre_of(voxel));
-    return spool_.add_enclosed(voxels);
+    VOX_CHECK(spool_.add_enclosed(voxels));
+    return check_size(face_bytes * spool_.faces() + sizeof(Vertex) * spool_.enclosed());
   }
 
   Status finish() override {
@@ -95,12 +97,7 @@ class GlbWriter final : public FaceWriter {
     lay_out(picture.size());
     const std::string text = document();
     const uint64_t bytes = file_head + chunk_head + text.size() + chunk_head + end_;
-    if (bytes > UINT32_MAX)
-      return fail(
-          ErrorCode::limit, out_->name(),
-          fmt::format("{} rectangles and {} points, {} bytes: a .glb file has at most {}: --roi takes "
-                      "a part, .obj has no such limit",
-                      spool_.faces(), spool_.enclosed(), bytes, UINT32_MAX));
+    VOX_CHECK(check_size(bytes));
     Packer packer(*out_);
     VOX_CHECK(packer.put(std::array<char, 4>{'g', 'l', 'T', 'F'}));
     VOX_CHECK(packer.put(std::array{uint32_t{2}, static_cast<uint32_t>(bytes)}));
@@ -123,6 +120,18 @@ class GlbWriter final : public FaceWriter {
   }
 
  private:
+  static constexpr uint64_t face_bytes = 4 * sizeof(Vertex) + 6 * sizeof(uint32_t);
+
+  /// As soon as it is known to be too large.
+  Status check_size(uint64_t bytes) const {
+    if (bytes <= UINT32_MAX) return {};
+    return fail(
+        ErrorCode::limit, out_->name(),
+        fmt::format("its rectangles take more than the {} bytes that a .glb file can have: --roi takes "
+                    "a part, .obj has no such limit",
+                    UINT32_MAX));
+  }
+
   /// The box of vertices, as they are written.
   struct Bounds {
     std::array<float, 3> lo{INFINITY, INFINITY, INFINITY}, hi{-INFINITY, -INFINITY, -INFINITY};

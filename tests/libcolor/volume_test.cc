@@ -162,6 +162,26 @@ TEST(ColorVolume, EveryVoxelComesBack) {
                 ASSERT_LE(distance(c, found != known.end() ? found->second : Rgb{}), bound);
               }
           EXPECT_EQ(plain->uniform(box).has_value(), !any);
+          // Those of the box alone, in order, each with the color that it has there.
+          auto expected = known.begin();
+          const auto to_inside = [&] {
+            while (expected != known.end() && !box.contains(Index3(morton_place(expected->first))))
+              ++expected;
+          };
+          ASSERT_TRUE((*volume)->for_each_voxel(box, [&](std::span<const SurfaceVoxel> run) -> Status {
+            for (const SurfaceVoxel& v : run) {
+              to_inside();
+              if (expected == known.end() || v.place != expected->first) return bad_usage("another voxel");
+              const Index3 to = Index3(morton_place(v.place)) - box.lo;
+              const std::byte* const p = span.row(to.y, to.z) + to.x * 4;
+              EXPECT_EQ(v.color, (Rgb{static_cast<uint8_t>(p[0]), static_cast<uint8_t>(p[1]),
+                                      static_cast<uint8_t>(p[2])}));
+              ++expected;
+            }
+            return {};
+          }));
+          to_inside();
+          EXPECT_TRUE(expected == known.end());
         }
       }
 }
