@@ -317,5 +317,29 @@ TEST(ColorVolume, DamagedFilesAreRefused) {
     }
 }
 
+// What walks through all voxels counts on their places.
+TEST(ColorVolume, AVoxelOutsideIsAnError) {
+  Options options;
+  options.codec = ColorCodec::raw;
+  ListSource source({{morton_code(3, 1, 2), {4, 5, 6}}, {morton_code(2, 2, 2), {1, 2, 3}}}, Index3(3));
+  const Encoded file = encoded(source, options);
+  const auto volume = opened(file.bytes);
+  ASSERT_TRUE(volume) << volume.error().what;
+  Fixture f;
+  int64_t greatest = 0;
+  const auto look = [&](std::span<const SurfaceVoxel> run) -> Status {
+    for (const SurfaceVoxel& v : run) greatest = std::max<int64_t>(greatest, morton_place(v.place).x);
+    return {};
+  };
+  const Status walked = (*volume)->for_each_voxel(look, f.ctx);
+  ASSERT_FALSE(walked);
+  EXPECT_EQ(walked.error().code, ErrorCode::input);
+  EXPECT_EQ(walked.error().what, "chunk LEAF: a voxel at 3,1,2: outside the volume");
+  // Of a part it is outside.
+  EXPECT_TRUE((*volume)->for_each_voxel({{0, 0, 0}, {3, 3, 2}}, look));
+  EXPECT_TRUE((*volume)->for_each_voxel({{1, 1, 1}, {3, 3, 3}}, look));
+  EXPECT_EQ(greatest, 2);
+}
+
 }  // namespace
 }  // namespace voxkit::color
