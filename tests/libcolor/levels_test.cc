@@ -46,13 +46,14 @@ std::vector<Scene> scenes() {
           {scattered(12, 700, 4), Index3(4096)}};
 }
 std::vector<Options> ways() {
-  std::vector<Options> all(4);
+  std::vector<Options> all(5);
   for (Options& options : all) options.codec = ColorCodec::raw;
   all[1].colors = Colors::all;
   all[2].curve = Curve::hilbert;
   all[2].counts = Counts::pointer;
   all[3] = all[2];
   all[3].colors = Colors::all;
+  all[4].geometry = Geometry::octree;
   return all;
 }
 
@@ -83,6 +84,17 @@ TEST(Levels, AreWhereTheVolumeIs) {
   EXPECT_EQ(coarse.unit, Unit::millimetre);
 }
 
+TEST(Levels, HaveBoxesOfTheVolume) {
+  const auto volume = volume_of({}, Index3(27, 30, 9), {});
+  ASSERT_TRUE(volume);
+  const Level level(volume, 2);
+  // Every voxel of the level that is touched; those that are cut off are as large as they are.
+  EXPECT_EQ(level.touched({{3, 4, 0}, {4, 9, 9}}), (Box{{0, 1, 0}, {1, 3, 3}}));
+  EXPECT_EQ(level.touched(volume->info().box()), level.info().box());
+  EXPECT_EQ(level.voxels_of({{0, 1, 2}, {1, 3, 3}}), (Box{{0, 4, 8}, {4, 12, 9}}));
+  EXPECT_EQ(level.voxels_of(level.info().box()), volume->info().box());
+}
+
 TEST(Levels, HaveTheMeansOfTheirVoxels) {
   for (const auto& [voxels, dims] : scenes())
     for (const Options& options : ways()) {
@@ -101,7 +113,8 @@ TEST(Levels, HaveTheMeansOfTheirVoxels) {
           EXPECT_NEAR(color.g, found->second[1], 0.6);
           EXPECT_NEAR(color.b, found->second[2], 0.6);
         }
-        const auto count = Level(volume, level).count(level_info(volume->info(), level).box());
+        const Level boxed(volume, level);
+        const auto count = boxed.count(boxed.info().box());
         ASSERT_TRUE(count);
         EXPECT_EQ(*count, expected.size());
         // A file without loss has the same colours, if it has any.
@@ -137,6 +150,22 @@ TEST(Levels, HaveTheMeansOfTheirVoxels) {
                     color);
               }
           EXPECT_EQ(source->uniform(box).has_value(), !any);
+          // Its voxels alone, in order.
+          Voxels alone;
+          for (const SurfaceVoxel& voxel : means)
+            if (box.contains(Index3(morton_place(voxel.place)))) alone.push_back(voxel);
+          size_t next = 0;
+          ASSERT_TRUE(boxed.for_each_voxel(box, [&](std::span<const SurfaceVoxel> run) -> Status {
+            for (const SurfaceVoxel& voxel : run) {
+              if (next >= alone.size() || voxel.place != alone[next].place) return bad_usage("another voxel");
+              EXPECT_EQ(voxel.color, alone[next++].color);
+            }
+            return {};
+          }));
+          EXPECT_EQ(next, alone.size());
+          const auto count_of_box = boxed.count(box);
+          ASSERT_TRUE(count_of_box);
+          EXPECT_EQ(*count_of_box, alone.size());
         }
       }
     }
