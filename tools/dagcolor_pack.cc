@@ -91,7 +91,9 @@ void declare(CommandLine& line, Options& o) {
       "octree (auto)",
       one_of(o.geometry, {"auto", "dag", "ssvdag", "octree"}));
   line.option("--for", "WHAT",
-              "What the file is made for: access or storage, which sets what is auto (access)",
+              "What the file is made for: access or storage: the smaller geometry, and --zstd 19 unless "
+              "another level "
+              "is said (access)",
               one_of(o.purpose, {"access", "storage"}));
   line.file("--tiles", "PATTERN",
             "Of a .dagc file: take the colours from the images that vox-decode --tiles wrote of it, such as "
@@ -125,6 +127,7 @@ color::Options encoder_options(const Options& o) {
   options.colors = o.colors == "all" ? color::Colors::all : color::Colors::leaf;
   options.geometry = geometry_of(o);
   options.for_storage = o.purpose == "storage";
+  if (options.for_storage && options.zstd == 0) options.zstd = most_zstd_level;
   options.counts = o.counts == "pointer" ? color::Counts::pointer : color::Counts::node;
   return options;
 }
