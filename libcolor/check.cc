@@ -121,8 +121,8 @@ class Checker {
         return bad(fmt::format("chunk SNOD {}, byte {}: {}", h, at, rule));
       };
       const NodeRef node = view_.node(h, static_cast<uint32_t>(at));
-      const uint8_t* const octants_end = node.there ? DagView::behind_octants(node) : nullptr;
-      if (!node.there || octants_end >= node.end) return broken("the node ends behind the chunk");
+      const uint8_t* const behind = node.there ? DagView::behind_octants(node) : nullptr;
+      if (!node.there || behind > node.end) return broken("the node ends behind the chunk");
       if (node.mask == 0) return broken("no octants");
       Below own{0, params_.colors == Colors::all ? uint64_t{1} : 0, at};
       for (uint32_t octant = 0; octant < 8; ++octant) {
@@ -147,7 +147,6 @@ class Checker {
         return broken(fmt::format("a count of {}: expected that of {} colors",
                                   view_.colors_below(h, static_cast<uint32_t>(at)), own.colors));
       below[place_of(at)] = own;
-      const uint8_t* const behind = count_at(octants_end, node.end).behind;
       at += static_cast<uint64_t>(behind - (view_.coded[static_cast<size_t>(h)] + at));
     }
     return below;

@@ -78,8 +78,9 @@ struct DagView {
     if (h == leaf_height) return leaf_colors(symmetric ? stored_word(pointer) : leaf(pointer), colors);
     const auto at = static_cast<size_t>(h);
     if (symmetric) {
-      const NodeRef ref = symmetric_node(h, pointer);
-      return ref.there ? count_at(behind_octants(ref), ref.end).colors : 0;
+      const uint32_t address = pointer & address_mask;
+      if (coded_bytes[at] < 3 || address > coded_bytes[at] - 3) return 0;
+      return count_at(coded[at] + address + 2, coded[at] + coded_bytes[at]).colors;
     }
     if (pointer >= words[at]) return 0;
     const uint32_t* const first = nodes[at] + pointer;
@@ -102,6 +103,7 @@ struct DagView {
   ChildRef child(const NodeRef& node, int h, uint32_t octant, OrderState state) const {
     if (counts == Counts::pointer)
       return {pointer(node, octant), node.words[2 + 2 * count_octants(node.mask & ((1u << octant) - 1))]};
+    if (symmetric) return symmetric_child(node, h, octant, octant_orders.before[state][octant]);
     uint64_t before = colors == Colors::all ? 1 : 0;
     for (uint32_t left = node.mask & octant_orders.before[state][octant]; left != 0; left &= left - 1)
       before += colors_below(h - 1, pointer(node, static_cast<uint32_t>(std::countr_zero(left))));
@@ -134,18 +136,22 @@ struct DagView {
     ref.mirror = pointer >> mirror_shift;
     ref.mask = mirrored_octants(octants_of_codes(ref.codes), ref.mirror);
     ref.end = coded[at] + coded_bytes[at];
-    ref.children = first + 2;
+    ref.children = count_at(first + 2, ref.end).behind;
     ref.above_words = h == leaf_height + 1 ? coded[at] : nullptr;
     return ref;
   }
   VOX_HD uint32_t symmetric_pointer(const NodeRef& node, uint32_t octant) const {
-    constexpr uint32_t nowhere = ~0u;
     const uint32_t stored = octant ^ node.mirror, code = node.codes >> 2 * stored & 3;
     const uint32_t in_node = node.words_of_codes(), before = (1u << 2 * stored) - 1;
     if (code == code_other && node.above_words != nullptr)
       return node.mirror << mirror_shift | word_in_node |
              static_cast<uint32_t>(behind_words(node, in_node & before) - node.above_words);
     const uint8_t* const at = node.children + pointer_bytes_of(node.codes & ~(3 * in_node) & before);
+    return pointer_at(node, at, code);
+  }
+  /// The pointer of this code that begins at a byte; one that leads nowhere if it is cut off.
+  VOX_HD static uint32_t pointer_at(const NodeRef& node, const uint8_t* at, uint32_t code) {
+    constexpr uint32_t nowhere = ~0u;
     if (at > node.end || node.end - at < static_cast<ptrdiff_t>(code + 1)) return nowhere;
     uint32_t pointer;
     if (node.end - at >= 4) {  // in one load
@@ -157,6 +163,33 @@ struct DagView {
       if (code == code_long) pointer |= static_cast<uint32_t>(at[2]) << 16;
     }
     return ((pointer & 7) ^ node.mirror) << mirror_shift | pointer >> 3;
+  }
+  /// The same as `child`, in one way along the node; `before`: the octants whose colours come before.
+  ChildRef symmetric_child(const NodeRef& node, int h, uint32_t octant, uint32_t before) const {
+    const uint32_t wanted = mirrored_octants(before | 1u << octant, node.mirror), own = octant ^ node.mirror;
+    const uint32_t in_node = node.words_of_codes();
+    ChildRef child{~0u, colors == Colors::all ? uint64_t{1} : 0};
+    const auto take = [&](uint32_t stored, uint32_t pointer) {
+      if (stored == own)
+        child.pointer = pointer;
+      else
+        child.colors_before += colors_below(h - 1, pointer);
+    };
+    const uint8_t* at = node.children;
+    for (uint32_t left = (node.codes | node.codes >> 1) & 0x5555 & ~in_node; left != 0; left &= left - 1) {
+      const auto stored = static_cast<uint32_t>(std::countr_zero(left)) / 2;
+      const uint32_t code = node.codes >> 2 * stored & 3;
+      if ((wanted >> stored & 1) != 0) take(stored, pointer_at(node, at, code));
+      at += code + 1;
+    }
+    for (uint32_t left = in_node; left != 0 && at < node.end; left &= left - 1) {
+      const auto stored = static_cast<uint32_t>(std::countr_zero(left)) / 2;
+      if ((wanted >> stored & 1) != 0)
+        take(stored,
+             node.mirror << mirror_shift | word_in_node | static_cast<uint32_t>(at - node.above_words));
+      at += 1 + count_octants(*at);
+    }
+    return child;
   }
   /// Where these words of a node end, its first ones.
   VOX_HD static const uint8_t* behind_words(const NodeRef& node, uint32_t in_node) {

@@ -219,15 +219,15 @@ class Builder {
       Class& own = level(h).classes[i];
       own.address = static_cast<uint32_t>(bytes.size());
       bytes.resize(bytes.size() + 2);
+      uint64_t left = own.colors;
+      for (; left >= 0x80; left >>= 7) bytes.push_back(static_cast<uint8_t>(left | 0x80));
+      bytes.push_back(static_cast<uint8_t>(left));
       uint32_t codes = 0;
       std::vector<uint8_t> words;
       for_each_child(h, i, [&](uint32_t octant, uint32_t number, uint32_t mirror) {
         codes |= write_child(bytes, words, h, number, mirror) << 2 * octant;
       });
       bytes.insert(bytes.end(), words.begin(), words.end());
-      uint64_t left = own.colors;
-      for (; left >= 0x80; left >>= 7) bytes.push_back(static_cast<uint8_t>(left | 0x80));
-      bytes.push_back(static_cast<uint8_t>(left));
       bytes[own.address] = static_cast<uint8_t>(codes);
       bytes[own.address + 1] = static_cast<uint8_t>(codes >> 8);
     }

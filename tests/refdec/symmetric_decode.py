@@ -40,6 +40,14 @@ class SymmetricNodes:
         codes = int.from_bytes(codes, "little")
         octants = [(o, codes >> 2 * o & 3) for o in range(8) if codes >> 2 * o & 3]
         require(octants, "chunk SNOD {}: byte {}: no octants", h, at - 2)
+        count, shift = 0, 0
+        while True:
+            byte, at = self.take(h, at, 1)
+            count |= (byte[0] & 127) << shift
+            shift += 7
+            if byte[0] < 128:
+                break
+            require(shift < 70, "chunk SNOD {}: byte {}: a count of more than ten bytes", h, at)
         found = {}
         for octant, code in octants:
             if h == 3 and code == 3:
@@ -59,14 +67,6 @@ class SymmetricNodes:
                     require(eight[0] != 0, "chunk SNOD {}: byte {}: an octant without voxels", h, at)
                     bits |= eight[0] << 8 * o
             found[octant] = (("word", bits), 0)
-        count, shift = 0, 0
-        while True:
-            byte, at = self.take(h, at, 1)
-            count |= (byte[0] & 127) << shift
-            shift += 7
-            if byte[0] < 128:
-                break
-            require(shift < 70, "chunk SNOD {}: byte {}: a count of more than ten bytes", h, at)
         return found, count, at
 
     def children(self, h, pointer):
