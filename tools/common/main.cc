@@ -137,7 +137,8 @@ void report(const std::string& tool, const Error& error) {
 
 void tell(const std::string& line) {
   Progress::clear();
-  fmt::print(stderr, "{}\n", line);
+  std::fputs((line + "\n").c_str(),
+             stderr);  // unlike fmt::print, which throws where nobody reads it any more
 }
 
 Status print(const std::string& text) {

@@ -27,13 +27,13 @@ Progress::~Progress() {
 }
 
 void Progress::clear() {
-  if (on_terminal.exchange(false)) fmt::print(stderr, "\r\033[K");
+  if (on_terminal.exchange(false)) std::fputs("\r\033[K", stderr);
 }
 
 void Progress::detail(const std::string& text) {
   detail_ = text;
   if (mode_ == ProgressMode::plain) {
-    fmt::print(stderr, "stage={} {}\n", stage_, detail_);
+    std::fputs(fmt::format("stage={} {}\n", stage_, detail_).c_str(), stderr);
   } else {
     update(fraction_);
   }
@@ -48,14 +48,16 @@ void Progress::update(double fraction) {
     if (complete_ || (!end && now - last_ < 500ms)) return;
     complete_ = end;
     last_ = now;
-    fmt::print(stderr, "stage={} done={:.2f}\n", stage_, fraction);
+    std::fputs(fmt::format("stage={} done={:.2f}\n", stage_, fraction).c_str(), stderr);
   } else if (mode_ == ProgressMode::automatic) {
     if (now - start_ < 1s || (shown_ && now - last_ < 100ms)) return;
     shown_ = true;
     on_terminal = true;
     last_ = now;
-    fmt::print(stderr, "\r{} {:3.0f} %{}{}\033[K", stage_, 100 * fraction, detail_.empty() ? "" : ", ",
-               detail_);
+    std::fputs(
+        fmt::format("\r{} {:3.0f} %{}{}\033[K", stage_, 100 * fraction, detail_.empty() ? "" : ", ", detail_)
+            .c_str(),
+        stderr);
     std::fflush(stderr);
   }
 }
