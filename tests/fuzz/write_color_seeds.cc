@@ -22,6 +22,9 @@ int main(int count, char** arguments) {
         options.codec = codec;
         options.counts = counts;
         options.colors = colors;
+        // Each geometry with some codecs.
+        constexpr Geometry geometries[] = {Geometry::dag, Geometry::octree, Geometry::ssvdag};
+        options.geometry = geometries[(number / 2) % (counts == Counts::node ? 3 : 2)];
         ListSource shell(sphere_shell(3), Index3(8)), few(scattered(6, 30, 1), Index3(64));
         for (ListSource* source : {&shell, &few}) {
           const std::vector<std::byte> file = compressed(*source, options);

@@ -54,6 +54,8 @@ KINDS = {
     "vqv means": (["vq-encode", "membrane:40,30,20:1", "-k", "40"], "a.vqv", PACKED + [DVR]),
     "vqv zstd": (["vq-encode", "membrane:40,30,20:1", "--zstd", "3"], "a.vqv", PACKED + [DVR]),
     "dagc": (["dagcolor-pack", "menger:2"], "a.dagc", PACKED + [["vox-decode", "@", "-o", "out.vox", "-f"]]),
+    "dagc plain": (["dagcolor-pack", "menger:2", "--geometry", "dag"], "a.dagc", PACKED),
+    "dagc octree": (["dagcolor-pack", "terrain:40", "--geometry", "octree"], "a.dagc", PACKED),
     "dagc palette": (["dagcolor-pack", "menger:2", "--codec", "palette"], "a.dagc", PACKED),
     "dagc pointer": (["dagcolor-pack", "menger:2", "--counts", "pointer", "--colors", "all"], "a.dagc", PACKED),
     "nrrd": (["vox-convert", "membrane:20,12,8:1"], "a.nrrd", VOLUME),
