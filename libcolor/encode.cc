@@ -219,7 +219,7 @@ Result<Report> encode(SurfaceSource& source, const Options& options, const Store
   if (info.format != VoxelFormat::rgba32 || height > most_levels)
     return fail(ErrorCode::internal, {}, "not the extents of a surface");
   if (!checked_voxels(info.dims))
-    return fail(ErrorCode::limit, {}, "a grid of 2^63 voxels or more: use a lower --resolution");
+    return fail(ErrorCode::limit, {}, "a grid of more than 2^62 voxels: use a lower --resolution");
   ContainerWriter container(sink, Codec::color, container_version_for(info), options.zstd, *ctx.memory);
   VOX_CHECK(add_volume_info(container, info));
 

@@ -92,7 +92,7 @@ class GlbWriter final : public FaceWriter {
   Status finish() override {
     VOX_CHECK(spool_.close());
     if (spool_.faces() == 0)
-      return fail(ErrorCode::usage, out_->name(), "there are no voxels: a mesh has at least one face");
+      return fail(ErrorCode::input, out_->name(), "there are no voxels: a mesh has at least one face");
     VOX_TRY(const std::vector<std::byte> picture, spool_.palette().png(ctx_));
     lay_out(picture.size());
     const std::string text = document();

@@ -103,9 +103,11 @@ class HeaderReader {
       // What goes beyond floats is nowhere.
       if (!(std::abs(header_.scale[a]) < 1e28) || header_.scale[a] == 0 ||
           !(std::abs(header_.offset[a]) < 1e38))
-        return bad(131 + 8 * static_cast<size_t>(a),
-                   fmt::format("{}: scale {}, offset {}: expected finite numbers, and a scale that is not 0",
-                               "xyz"[a], header_.scale[a], header_.offset[a]));
+        return bad(
+            131 + 8 * static_cast<size_t>(a),
+            fmt::format(
+                "{}: scale {}, offset {}: expected magnitudes below 1e28 and 1e38, and a scale that is not 0",
+                "xyz"[a], header_.scale[a], header_.offset[a]));
     }
     VOX_CHECK(read_points(header_bytes, minor));
     VOX_CHECK(read_records(header_bytes, minor));

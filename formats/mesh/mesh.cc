@@ -92,7 +92,7 @@ Status check_mesh(Mesh& mesh, const std::string& path) {
       if (!is_finite(p))
         return bad_input(path,
                          fmt::format("corrupt mesh: triangle {}: a corner at ({}, {}, {}): expected finite "
-                                     "coordinates",
+                                     "coordinates, as a float holds them",
                                      i, p.x, p.y, p.z));
       for (const auto* uvs : {&mesh.uvs, &mesh.emission_uvs})
         if (!uvs->empty() && (!std::isfinite((*uvs)[v].x) || !std::isfinite((*uvs)[v].y)))

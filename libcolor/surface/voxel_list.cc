@@ -47,8 +47,9 @@ Result<std::unique_ptr<SurfaceSource>> surface_of(VoxelScene scene, Context& ctx
     info.affine.origin[a] = static_cast<double>(lo[static_cast<Index3::length_type>(a)]) + 0.5;
   if (std::max({info.dims.x, info.dims.y, info.dims.z}) > int64_t{1} << most_levels ||
       !checked_voxels(info.dims))
-    return bad_input({}, fmt::format("a scene of {} x {} x {} voxels: expected at most {} a side",
-                                     info.dims.x, info.dims.y, info.dims.z, 1 << most_levels));
+    return bad_input(
+        {}, fmt::format("a scene of {} x {} x {} voxels: expected at most {} a side, and 2^62 in all",
+                        info.dims.x, info.dims.y, info.dims.z, 1 << most_levels));
   VOX_TRY(Reservation memory, Reservation::take(scene.voxels.size() * 2 * sizeof(SurfaceVoxel),
                                                 "the voxels of a scene, sorted", ctx));
   std::vector<SurfaceVoxel> voxels;
