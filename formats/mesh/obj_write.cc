@@ -36,8 +36,7 @@ class ObjWriter final : public FaceWriter {
   Status finish() override {
     VOX_CHECK(spool_.close());
     if (spool_.faces() == 0)
-      return fail(ErrorCode::input, files_[0]->name(),
-                  "there are no voxels: a mesh has at least one face");
+      return fail(ErrorCode::input, files_[0]->name(), "there are no voxels: a mesh has at least one face");
     const std::string library = name_in_folder(files_[1]->name()),
                       picture = name_in_folder(files_[2]->name());
     VOX_CHECK(
