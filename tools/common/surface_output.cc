@@ -1,5 +1,7 @@
 #include "tools/common/surface_output.h"
 
+#include <fmt/format.h>
+
 #include <algorithm>
 #include <vector>
 
@@ -118,15 +120,23 @@ Status write_models(const Part& part, uint64_t count, const std::string& name, b
   for (const color::Rgb& c : palette.colors()) chosen.push_back({c.r, c.g, c.b});
   VOX_TRY(auto writer, create_magicavoxel(name, part.info(), count, chosen, force, ctx));
   std::vector<IndexedVoxel> run;
+  uint64_t changed = 0;
   VOX_CHECK(part.each(
       [&](Voxels voxels) -> Status {
         run.clear();
-        for (const color::SurfaceVoxel& v : voxels)
-          run.push_back({part.place(v), static_cast<uint8_t>(palette.index_of(v.color))});
+        for (const color::SurfaceVoxel& v : voxels) {
+          const uint32_t index = palette.index_of(v.color);
+          changed += palette.colors()[index] == v.color ? 0 : 1;
+          run.push_back({part.place(v), static_cast<uint8_t>(index)});
+        }
         return writer->add(run);
       },
       ctx));
-  return writer->finish();
+  VOX_CHECK(writer->finish());
+  if (changed > 0)
+    ctx.note(fmt::format("{}: a .vox file has 255 colors: {} of {} voxels have the nearest of these", name,
+                         changed, count));
+  return {};
 }
 
 Status write_mesh(const Part& part, bool enclosed, SurfaceCount& count, const std::string& name, bool force,
