@@ -99,6 +99,12 @@ Status Volume::decode(const Box& box, VoxelSpan out) const {
   VOX_TRY(const bool complete,
           walk_box(*this, box, [&](uint64_t leaf, Index3 corner, uint64_t color, OrderState state) {
             if (leaf == 0) return false;
+            if ((leaf & ~leaf_within(corner, info_.box())) != 0) {
+              store_->report(*container_,
+                             fmt::format("chunk LEAF: a voxel of the word at {},{},{}: outside the volume",
+                                         corner.x, corner.y, corner.z));
+              return false;
+            }
             for (uint64_t left = leaf & leaf_within(corner, box); left != 0; left &= left - 1) {
               const auto bit = static_cast<uint32_t>(std::countr_zero(left));
               const Voxel voxel = opaque(reader.color(color + leaf_index(leaf, bit, params_.colors, state)));
