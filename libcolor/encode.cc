@@ -150,27 +150,36 @@ uint64_t bytes_of(const SymmetricDag& dag) {
   return bytes;
 }
 
+Result<EncodedOctree> encoded_octree(const Dag& dag, Context& ctx) {
+  Reservation memory(*ctx.memory);
+  VOX_TRY(const Octree octree, octree_of(dag, memory));
+  return encode_octree(octree, ctx);
+}
+
 Status write_geometry(const Dag& dag, const Options& options, ContainerWriter& container, Params& p,
                       Context& ctx) {
-  const auto wanted = [&](Geometry geometry) { return options.geometry.value_or(geometry) == geometry; };
-  std::optional<SymmetricDag> symmetric;
-  if (wanted(Geometry::ssvdag) && options.counts == Counts::node) {
-    auto made = symmetric_dag_of(dag, ctx);
-    if (made) {
-      symmetric = std::move(*made);
-    } else {
-      if (options.geometry || made.error().code != ErrorCode::limit)
-        return tl::unexpected<Error>(made.error());
-      ctx.note("geometry is stored without symmetry: " + made.error().what);
-    }
+  const bool any = !options.geometry;
+  // What was not asked for by name, and is too large, is left out, with a note.
+  const auto unless_too_large = [&](const auto& made, const char* what) -> Status {
+    if (made) return {};
+    if (!any || made.error().code != ErrorCode::limit) return tl::unexpected<Error>(made.error());
+    ctx.note(fmt::format("geometry is not stored {}: {}", what, made.error().what));
+    return {};
+  };
+  Result<SymmetricDag> symmetric = SymmetricDag();
+  const bool with_symmetry = (any && options.counts == Counts::node) || options.geometry == Geometry::ssvdag;
+  if (with_symmetry) {
+    symmetric = symmetric_dag_of(dag, ctx);
+    VOX_CHECK(unless_too_large(symmetric, "with symmetry"));
   }
-  if (options.geometry ? *options.geometry == Geometry::octree : options.for_storage) {
-    Reservation memory(*ctx.memory);
-    VOX_TRY(const Octree octree, octree_of(dag, memory));
-    VOX_TRY(const EncodedOctree encoded, encode_octree(octree, ctx));
-    if (!symmetric || encoded.bytes <= bytes_of(*symmetric)) return write_octree(encoded, container, p);
+  const bool use_symmetric = with_symmetry && symmetric;
+  if (any ? options.for_storage : options.geometry == Geometry::octree) {
+    const auto encoded = encoded_octree(dag, ctx);
+    VOX_CHECK(unless_too_large(encoded, "as an octree"));
+    if (encoded && (!use_symmetric || encoded->bytes <= bytes_of(*symmetric)))
+      return write_octree(*encoded, container, p);
   }
-  return symmetric ? write_symmetric(*symmetric, container, p) : write_dag(dag, container, p);
+  return use_symmetric ? write_symmetric(*symmetric, container, p) : write_dag(dag, container, p);
 }
 
 /// Room for more colours, ahead of need: counted, and so is the copy while they move.

@@ -109,10 +109,15 @@ Status Store::check_geometry(const Container& container, const Params& params) c
   if (table[leaves_].length % sizeof(uint64_t) != 0 || table[leaves_].length == 0)
     return bad(fmt::format("chunk LEAF has {} bytes: expected a multiple of 8", table[leaves_].length));
   const bool symmetric = params.geometry == Geometry::ssvdag;
+  if (symmetric && table[leaves_].length / sizeof(uint64_t) > word_in_node)
+    return bad(fmt::format("chunk LEAF has {} bytes: expected at most 2^28 words", table[leaves_].length));
   for (size_t h = 0; h < nodes_.size(); ++h) {
     if (nodes_[h] == none)
       return bad(fmt::format("no chunk {} {}", symmetric ? "SNOD" : "NODE", h + leaf_height + 1));
     const uint64_t length = table[nodes_[h]].length;
+    if (const uint64_t most = h == 0 ? word_in_node : address_mask + 1; symmetric && length > most)
+      return bad(
+          fmt::format("chunk SNOD {} has {} bytes: expected at most {}", h + leaf_height + 1, length, most));
     if (!symmetric && length % sizeof(uint32_t) != 0)
       return bad(
           fmt::format("chunk NODE {} has {} bytes: expected a multiple of 4", h + leaf_height + 1, length));

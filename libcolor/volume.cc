@@ -3,6 +3,7 @@
 
 #include <algorithm>
 #include <bit>
+#include <glm/vector_relational.hpp>
 
 #include "formats/volume_chunks.h"
 #include "libcolor/dag/box_walk.h"
@@ -18,10 +19,22 @@ Voxel opaque(Rgb c) {
 
 /// Calls visit(word, corner, color, state) for the leaf words that touch a box, in Morton order, through an
 /// octree or a DAG, whichever there is: where they begin, the number of their first colour, how they are gone
-/// through. False if `visit` did not go on, or a node is missing or has no octants.
+/// through. False if `visit` did not go on, a node is missing or has no octants, or a word has a voxel
+/// outside of the volume, which the store then tells.
 template <class Visit>
-Result<bool> walk_box(const Volume& volume, const Box& box, const Visit& visit) {
+Result<bool> walk_box(const Volume& volume, const Box& box, const Visit& visit_sound) {
   const Store& store = volume.store();
+  const Box all = volume.info().box();
+  const auto visit = [&](uint64_t word, Index3 corner, uint64_t color, OrderState state) {
+    const bool at_end = glm::any(glm::greaterThan(corner + (int64_t{1} << leaf_height), all.hi));
+    if (const uint64_t outside = at_end ? word & ~leaf_within(corner, all) : 0; outside != 0) {
+      const Index3 at = corner + Index3(morton_place(static_cast<uint64_t>(std::countr_zero(outside))));
+      store.report(volume.container(),
+                   fmt::format("chunk LEAF: a voxel at {},{},{}: outside the volume", at.x, at.y, at.z));
+      return false;
+    }
+    return visit_sound(word, corner, color, state);
+  };
   VOX_TRY(OctreeReader* const octree, store.octree(volume.container(), volume.params()));
   if (octree != nullptr)
     return octree->for_each_word(box, [&](uint64_t word, Index3 corner, uint64_t first) {
@@ -99,12 +112,6 @@ Status Volume::decode(const Box& box, VoxelSpan out) const {
   VOX_TRY(const bool complete,
           walk_box(*this, box, [&](uint64_t leaf, Index3 corner, uint64_t color, OrderState state) {
             if (leaf == 0) return false;
-            if ((leaf & ~leaf_within(corner, info_.box())) != 0) {
-              store_->report(*container_,
-                             fmt::format("chunk LEAF: a voxel of the word at {},{},{}: outside the volume",
-                                         corner.x, corner.y, corner.z));
-              return false;
-            }
             for (uint64_t left = leaf & leaf_within(corner, box); left != 0; left &= left - 1) {
               const auto bit = static_cast<uint32_t>(std::countr_zero(left));
               const Voxel voxel = opaque(reader.color(color + leaf_index(leaf, bit, params_.colors, state)));
@@ -174,15 +181,7 @@ Status Volume::for_each_voxel(const Box& box, const SurfaceSource::Sink& sink) c
         }
         found += static_cast<uint64_t>(std::popcount(leaf));
         if (leaf == 0 || found > params_.leaf_voxels) return false;
-        const uint64_t inside = leaf & leaf_within(corner, box);
-        if (whole && inside != leaf) {
-          const Index3 at =
-              corner + Index3(morton_place(static_cast<uint64_t>(std::countr_zero(leaf & ~inside))));
-          store_->report(*container_, fmt::format("chunk LEAF: a voxel at {},{},{}: outside the volume", at.x,
-                                                  at.y, at.z));
-          return false;
-        }
-        for (uint64_t left = inside; left != 0; left &= left - 1) {
+        for (uint64_t left = leaf & leaf_within(corner, box); left != 0; left &= left - 1) {
           const auto bit = static_cast<uint32_t>(std::countr_zero(left));
           run.push_back({first | bit, reader.color(color + leaf_index(leaf, bit, params_.colors, state))});
         }

@@ -29,8 +29,8 @@ namespace voxkit::color {
 inline constexpr uint32_t mirror_shift = 29, address_mask = (1u << mirror_shift) - 1;
 /// Of the address of a leaf word: it is in a node, at a byte of those of the height above.
 inline constexpr uint32_t word_in_node = 1u << 28;
-/// Codes of octants.
-inline constexpr uint32_t code_short = 1, code_long = 2, code_other = 3;
+/// Codes of octants: a pointer of 3 bytes; one of 4, or a word.
+inline constexpr uint32_t code_long = 2, code_other = 3;
 
 /// Exchanges the bits of `low` with those that many places above them, if asked to; without a branch, as it
 /// is as good as chance.

