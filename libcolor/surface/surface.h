@@ -9,6 +9,7 @@
 
 #include "formats/context.h"
 #include "formats/volume.h"
+#include "libcolor/surface/attributes.h"
 
 namespace voxkit::color {
 
@@ -26,6 +27,18 @@ struct SurfaceVoxel {
 };
 inline constexpr int most_levels = 21;
 
+/// Some voxels, one after the other, and what they have beside colours: AttributeSet::bytes of each, in the
+/// same order. What is made of voxels alone has none.
+struct VoxelRun {
+  std::span<const SurfaceVoxel> voxels;
+  std::span<const std::byte> attributes;
+
+  VoxelRun(std::span<const SurfaceVoxel> v, std::span<const std::byte> a = {}) : voxels(v), attributes(a) {}
+  VoxelRun(const std::vector<SurfaceVoxel>& v) : voxels(v) {}
+  /// For those who look at colours only.
+  operator std::span<const SurfaceVoxel>() const { return voxels; }
+};
+
 /// A coloured surface that is read once, in Morton order, in bounded memory.
 class SurfaceSource {
  public:
@@ -38,7 +51,10 @@ class SurfaceSource {
   /// Whether the input's emission is in the colours.
   bool emits() const { return emits_; }
 
-  using Sink = std::function<Status(std::span<const SurfaceVoxel>)>;
+  /// What its voxels have beside colours.
+  AttributeSet attributes() const { return attributes_; }
+
+  using Sink = std::function<Status(const VoxelRun&)>;
   /// Calls `sink`, from one thread at a time, with runs of voxels. Places ascend strictly, within a run and
   /// from run to run: each voxel comes once. Uses ctx.threads threads; what comes does not depend on them.
   virtual Status read(Context& ctx, const Sink& sink) = 0;
@@ -47,6 +63,7 @@ class SurfaceSource {
   VolumeInfo info_;
   std::vector<std::string> notes_;
   bool emits_ = false;
+  AttributeSet attributes_;
 };
 
 }  // namespace voxkit::color

@@ -162,17 +162,17 @@ TEST_F(VoxelFacesTest, FilesAppearTogetherOrNotAtAll) {
 }
 
 TEST_F(VoxelFacesTest, WhatCannotBeIsRefused) {
-  const auto refused = [&](const std::string& name, const std::vector<FaceRectangle>& faces) {
+  const auto refused = [&](const std::string& name, const std::vector<FaceRectangle>& faces, ErrorCode code) {
     const Status status = write(name, faces);
-    EXPECT_FALSE(status) << name;
-    EXPECT_EQ(status.error().code, ErrorCode::usage) << name;
+    ASSERT_FALSE(status) << name;
+    EXPECT_EQ(status.error().code, code) << name;
     EXPECT_EQ(names(), std::set<std::string>()) << name;
   };
-  refused("a.glb", {});
-  refused("a.obj", {});
-  refused("a.stl", faces());
-  refused("a\nb.obj", faces());
-  refused(" a.obj", faces());
+  refused("a.glb", {}, ErrorCode::input);
+  refused("a.obj", {}, ErrorCode::input);
+  refused("a.stl", faces(), ErrorCode::usage);
+  refused("a\nb.obj", faces(), ErrorCode::usage);
+  refused(" a.obj", faces(), ErrorCode::usage);
 }
 
 TEST_F(VoxelFacesTest, PalettesAreInOrderAndOfExactPlaces) {
