@@ -1,6 +1,7 @@
 // Coloured surfaces: voxels in space, each with one colour, from wherever they come.
 #pragma once
 
+#include <concepts>
 #include <cstdint>
 #include <functional>
 #include <span>
@@ -34,7 +35,10 @@ struct VoxelRun {
   std::span<const std::byte> attributes;
 
   VoxelRun(std::span<const SurfaceVoxel> v, std::span<const std::byte> a = {}) : voxels(v), attributes(a) {}
-  VoxelRun(const std::vector<SurfaceVoxel>& v) : voxels(v) {}
+  template <class Voxels>
+  requires(!std::same_as<Voxels, VoxelRun> &&
+           std::convertible_to<const Voxels&, std::span<const SurfaceVoxel>>) VoxelRun(const Voxels& v)
+      : voxels(v) {}
   /// For those who look at colours only.
   operator std::span<const SurfaceVoxel>() const { return voxels; }
 };
