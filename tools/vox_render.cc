@@ -44,6 +44,7 @@ struct Costs {
   Json frames = Json::array();
   std::vector<double> ms;
   uint64_t rays = 0;
+  double lookup_seconds = 0;
 
   double average() const {
     return std::accumulate(ms.begin(), ms.end(), 0.0) / static_cast<double>(ms.size());
@@ -54,6 +55,7 @@ struct Costs {
   void add(const Frame& frame, Json json) {
     ms.push_back(frame.seconds * 1000);
     rays += frame.rays;
+    lookup_seconds += frame.lookup_seconds;
     json.set("ms", ms.back())
         .set("rays", frame.rays)
         .set("rays_hit", frame.rays_hit)
@@ -69,6 +71,7 @@ struct Costs {
     json.set("frames", std::move(frames));
     json.set("ms_min", *std::min_element(ms.begin(), ms.end())).set("ms_avg", average());
     json.set("ms_max", *std::max_element(ms.begin(), ms.end())).set("mrays_per_s", mrays_per_s());
+    if (lookup_seconds > 0) json.set("lookup_ms_avg", lookup_seconds * 1000 / static_cast<double>(ms.size()));
   }
 };
 

@@ -140,6 +140,21 @@ class TablesTest(SweepCase):
         for row, cells in zip(self.rows(), table):  # of its voxels, not of the void around them
             self.assertEqual(float(cells["grmse"]), row["encode"]["grmse"])
 
+    def test_data(self):
+        """What is in a folder of data is left out, with a word, until the folder is named."""
+        (self.folder / "data").mkdir()
+        (self.folder / "data" / "t.ply").write_text(POINTS, encoding="utf-8")
+        inputs = [{"name": "points", "input": "t.ply", "data": True}]
+        codecs = [{"tool": "dagcolor-pack", "options": {"codec": "raw"}}]
+        spec = self.spec({"inputs": ["terrain:8", *inputs], "codecs": codecs, "decode": False, "metrics": False})
+        self.assertIn("left out: points: --data names", self.sweep(spec=spec).stderr)
+        self.assertEqual([row["input"] for row in self.table()], ["terrain:8"])
+        self.assertNotIn("left out", self.sweep("--data", self.folder / "data", spec=spec).stderr)
+        self.assertEqual([(row["input"], row["status"]) for row in self.table()], [("terrain:8", "done"), ("points", "done")])
+        alone = self.spec({"inputs": inputs, "codecs": codecs}, "alone.json")
+        self.assertIn("inputs: all of them are in a folder of data: expected --data DIR", self.sweep(spec=alone, code=2).stderr)
+        self.assertIn("is no folder", self.sweep("--data", self.folder / "none", spec=spec, code=3).stderr)
+
     def test_front_of_colours(self):
         """Where nothing but colours is compared, the front is of their error."""
         spec = self.spec({"inputs": ["menger:2"], "metrics": False, "decode": False, "codecs": [
@@ -406,7 +421,7 @@ class OutputTest(SweepCase):
             import matplotlib  # noqa: F401
         except ImportError:
             self.skipTest("no python3-matplotlib")
-        smaller = ((r"menger:[0-9]", "menger:2"), (r"terrain:512", "menger:1"), (r"(marschner-lobb|sphere):[0-9]+", r"\1:16"),
+        smaller = ((r"menger:[0-9]", "menger:2"), ("terrain:512:box", "menger:3"), ("terrain:512", "menger:1"), (r"(marschner-lobb|sphere):[0-9]+", r"\1:16"),
                    (r"membrane:[0-9,]+", "membrane:16,16,8"), (r'"size": "[0-9x]+"', '"size": "24x18"'), ("orbit:4", "orbit:1"), ("thesis94", "orbit:1"))
         for path in sorted((pathlib.Path(__file__).resolve().parents[2] / "scripts" / "figures").glob("*.json")):
             text = path.read_text(encoding="utf-8")
@@ -423,13 +438,13 @@ class OutputTest(SweepCase):
 
     @staticmethod
     def few(spec):
-        """Each input once, two values of one option, and one of the others."""
+        """Each built-in input once, two values of one option, and one of the others."""
         def cut(options):
             lists = [key for key, value in options.items() if isinstance(value, list)]
             return {key: value[: 2 if key == lists[-1] else 1] if key in lists else value for key, value in options.items()}
         for thing in (spec, *spec["codecs"], *spec["plots"]):
             if "inputs" in thing:
-                thing["inputs"] = list(dict.fromkeys(thing["inputs"]))
+                thing["inputs"] = list(dict.fromkeys(name for name in thing["inputs"] if isinstance(name, str)))
         for codec in spec["codecs"]:
             grids = codec["options"]
             codec["options"] = [cut(grid) for grid in grids] if isinstance(grids, list) else cut(grids)

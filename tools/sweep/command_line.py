@@ -44,6 +44,7 @@ class Option:
 class Options:
     spec: str = ""
     output: str = ""
+    data: str = ""
     dry_run: bool = False
     snakemake: bool = False
     collect: bool = False
@@ -91,6 +92,7 @@ OPTIONS = [
     Option("V", "version", "", "Show the version"),
     Option("o", "output", "DIR", "Folder of the results; what is there already is not run again", str,
            kind="folder"),
+    Option("", "data", "DIR", 'Folder of the inputs that the spec marks with "data"; without it they are left out', str, kind="folder"),
     Option("", "dry-run", "", "Print what would be run, and how much of it is done"),
     Option("", "best", "CONDITIONS", "Print the smallest setting of each input that fulfils all of them, such as "
            '"psnr>=45,decode_seconds<2"; exit 1 if there is none', str, several=True),

@@ -56,7 +56,11 @@ def work(words, build):
     if options.snakemake and options.spec == "-":
         raise Failure(USAGE, "--snakemake: jobs read SPEC again: expected a file")
     check_output(options.output)
-    spec = spec_file.read(options.spec, OptionNames(build))
+    if options.data and not os.path.isdir(options.data):
+        raise Failure(INPUT, "is no folder: expected that of the data", options.data)
+    spec = spec_file.read(options.spec, OptionNames(build), options.data)
+    if spec.left_out and not options.quiet:
+        sys.stderr.write(f"{TOOL}: left out: {printable(', '.join(spec.left_out))}: --data names the folder that they are in\n")
     threads = options.threads or machine.available_threads()
     memory = options.max_memory or machine.usable_memory() // 4 * 3
     versions = versions_of(spec, build)
@@ -155,7 +159,7 @@ def write_workflow(options, spec, cases, build, threads, memory):
         raise Failure(OUTPUT, "exists: use --force to overwrite", path)
     prepare(options.output)
     each = min(spec.threads or threads, threads)
-    write_whole(path, workflow.text(cases, options.spec, options.output, os.path.join(build.folder, TOOL), each,
+    write_whole(path, workflow.text(cases, options, os.path.join(build.folder, TOOL), each,
                                     memory // max(threads // each, 1)))
     if options.json:
         print_out(json.dumps({"schema": 1, "tool": TOOL, "settings": len(cases), "output": path}, indent=2) + "\n")

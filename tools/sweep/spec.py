@@ -8,7 +8,7 @@ import os
 import re
 import sys
 
-from sweep.failure import Failure, INPUT, LIMIT, nearest
+from sweep.failure import Failure, INPUT, LIMIT, USAGE, nearest
 
 MOST_BYTES = 16 << 20
 MOST_SETTINGS = 100_000  # of all inputs and codecs together
@@ -25,6 +25,7 @@ class Input:
     file: str
     options: tuple      # pairs (name, value), as all options here
     reference: str      # what results are compared with: a file, a built-in, or "" for the input itself
+    there: bool = True  # false: is in a folder of data that was not given
 
 
 @dataclasses.dataclass(frozen=True)
@@ -74,6 +75,7 @@ class Spec:
     timeout: float      # seconds a program may take; 0: for ever
     repeat: int         # times that encoders, decoders and renders run; the fastest counts
     keep: bool          # compressed files, after they have served
+    left_out: tuple = ()  # names of inputs whose folder was not given
 
 
 def is_surface(file):
@@ -128,14 +130,15 @@ class Place:
         return self.value
 
 
-def read(name, option_names):
-    """The Spec in a file; "-" is standard input. `option_names` says which options a program has."""
+def read(name, option_names, data=""):
+    """The Spec in a file; "-" is standard input. `option_names` says which options a program has. `data`: the folder of
+    the inputs that are marked so; without it the spec has the others only."""
     value = load(name)
     place = Place("standard input" if name == "-" else name, "", value)
     top = place.members(["inputs", "codecs", "renders", "metrics", "decode", "plots", "threads", "timeout", "repeat",
                          "keep", "title"],
                         ["inputs", "codecs"])
-    inputs = named(place, top["inputs"], [read_input(item, option_names) for item in top["inputs"].items()])
+    inputs = named(place, top["inputs"], [read_input(item, option_names, data) for item in top["inputs"].items()])
     codecs = named(place, top["codecs"], [read_codec(item, inputs, option_names) for item in top["codecs"].items()])
     renders = [render for item in (top["renders"].items() if "renders" in top else [])
                for render in read_renders(item, inputs, codecs, option_names)]
@@ -152,7 +155,12 @@ def read(name, option_names):
         timeout=top["timeout"].number(0, 10**9) if "timeout" in top else 0,
         repeat=top["repeat"].number(1, 1000, whole=True) if "repeat" in top else 1,
         keep=top["keep"].boolean() if "keep" in top else False)
-    settings = sum(len(codec.settings) * len(codec.inputs) for codec in codecs)
+    there = {entry.name for entry in inputs if entry.there}
+    if not there:
+        top["inputs"].fail("all of them are in a folder of data: expected --data DIR", USAGE)
+    spec = dataclasses.replace(spec, inputs=tuple(entry for entry in inputs if entry.there),
+                               left_out=tuple(entry.name for entry in inputs if not entry.there))
+    settings = sum(len(codec.settings) * len(codec.inputs & there) for codec in codecs)
     if settings > MOST_SETTINGS:
         place.fail(f"{settings} settings: expected at most {MOST_SETTINGS}", LIMIT)
     return spec
@@ -272,15 +280,18 @@ def checked_file(place):
     return file
 
 
-def read_input(place, option_names):
+def read_input(place, option_names, data):
     if isinstance(place.value, str):
         file = checked_file(place)
         return Input(default_name(file), file, (), "")
-    keys = place.members(["name", "input", "options", "reference"], ["input"])
+    keys = place.members(["name", "input", "options", "reference", "data"], ["input"])
     file = checked_file(keys["input"])
+    name = checked_name(keys["name"]) if "name" in keys else default_name(file)
+    of_data = "data" in keys and keys["data"].boolean()
+    if of_data and data:
+        file = os.path.join(os.path.abspath(data), file)
     options = read_options(keys["options"], option_names("vox-render"), OURS, "vox-render") if "options" in keys else ()
-    return Input(checked_name(keys["name"]) if "name" in keys else default_name(file), file, options,
-                 checked_file(keys["reference"]) if "reference" in keys else "")
+    return Input(name, file, options, checked_file(keys["reference"]) if "reference" in keys else "", bool(data) or not of_data)
 
 
 def default_name(file):

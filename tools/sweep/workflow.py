@@ -12,6 +12,7 @@ import shlex
 
 SWEEP = {sweep}
 SPEC = {spec}
+DATA = {data}
 FOLDER = {folder}
 CASES = {cases}
 
@@ -29,22 +30,23 @@ rule setting:
     resources: mem_mb={mem_mb}
     params:
         command=lambda wildcards, threads, resources: shlex.join(
-            [SWEEP, SPEC, "-o", FOLDER, "--case", wildcards.case, "--threads", str(threads),
+            [SWEEP, SPEC, *DATA, "-o", FOLDER, "--case", wildcards.case, "--threads", str(threads),
              "--max-memory", str(resources.mem_mb * 3 // 4) + "M", "--quiet"])
     shell: "{{params.command}} || [ $? -eq 1 ]"
 
 rule tables:
     input: expand("settings/{{case}}.finished", case=CASES)
     output: "index.html", "results.csv", "results.jsonl"
-    params: command=shlex.join([SWEEP, SPEC, "-o", FOLDER, "--collect"])
+    params: command=shlex.join([SWEEP, SPEC, *DATA, "-o", FOLDER, "--collect"])
     shell: "{{params.command}} || [ $? -eq 1 ]"
 '''
 
 
-def text(cases, spec_file, output, program, threads, memory):
+def text(cases, options, program, threads, memory):
     """The Snakefile. Names of files are absolute: jobs run elsewhere. `threads` and `memory` are those of one job, which
     gives a quarter of its memory to what is not voxels."""
     names = ",\n         ".join(json.dumps(case.name) for case in cases)
-    return TEMPLATE.format(sweep=json.dumps(program), spec=json.dumps(os.path.abspath(spec_file)),
-                           folder=json.dumps(os.path.abspath(output)), cases=f"[{names}]", threads=threads,
+    return TEMPLATE.format(sweep=json.dumps(program), spec=json.dumps(os.path.abspath(options.spec)),
+                           data=json.dumps(["--data", os.path.abspath(options.data)] if options.data else []),
+                           folder=json.dumps(os.path.abspath(options.output)), cases=f"[{names}]", threads=threads,
                            mem_mb=max(memory >> 20, 1))
