@@ -406,6 +406,8 @@ class OutputTest(SweepCase):
         self.assertEqual((self.out / "results.csv").read_bytes(), old)
         self.assertEqual([path.name for path in self.out.glob(".*")], [".lock"])
 
+
+class FiguresTest(SweepCase):
     def test_figures(self):
         """The specs of scripts/figures are good ones."""
         specs = sorted((pathlib.Path(__file__).resolve().parents[2] / "scripts" / "figures").glob("*.json"))
