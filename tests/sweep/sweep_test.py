@@ -54,6 +54,8 @@ def answer(name, *arguments):
 
 
 class SweepCase(unittest.TestCase):
+    results = None
+
     def setUp(self):
         temporary = tempfile.TemporaryDirectory(prefix="voxkit-sweep-")
         self.addCleanup(temporary.cleanup)
@@ -69,6 +71,13 @@ class SweepCase(unittest.TestCase):
         done = program("vox-sweep", spec or self.spec(), "-o", out or self.out, *arguments)
         self.assertEqual(done.returncode, code, done.stderr)
         return done
+
+    def swept(self, out=None):
+        """A folder of results of SPEC, as a sweep leaves it: a copy of one that was run once for all tests."""
+        if not SweepCase.results:
+            SweepCase.results = tempfile.TemporaryDirectory(prefix="voxkit-sweep-")
+            self.sweep("--quiet", out=pathlib.Path(SweepCase.results.name) / "out")
+        shutil.copytree(pathlib.Path(SweepCase.results.name) / "out", out or self.out)
 
     def rows(self, out=None):
         return [json.loads(line) for line in ((out or self.out) / "results.jsonl").read_text(encoding="utf-8").splitlines()]
@@ -89,7 +98,7 @@ class SweepCase(unittest.TestCase):
 
 class TablesTest(SweepCase):
     def test_every_setting_once_in_order(self):
-        self.sweep("--quiet")
+        self.swept()
         expected = [("sphere:24", "svmm", {"quality": q, "blockwidth": w, "rootwidth": "4"})
                     for q, w in itertools.product(("60", "90", "100"), "04")]
         expected += [("sphere:24", "vq", {"lossless": True})] + [("sphere:24", "vq", {"reduce": n}) for n in "28"]
@@ -98,7 +107,7 @@ class TablesTest(SweepCase):
         self.assertEqual({row["status"] for row in self.rows()}, {"done"})
 
     def test_numbers_are_those_of_the_programs(self):
-        self.sweep("--quiet")
+        self.swept()
         rows = self.rows()
         table = self.table()
         for index, options in ((0, ["--quality", 60, "--blockwidth", 0, "--rootwidth", 4]), (12, ["--quality", 90, "--blockwidth", 0, "--rootwidth", 4])):
@@ -120,7 +129,7 @@ class TablesTest(SweepCase):
 
     def test_front(self):
         """Marked is what no other setting of the input beats in both size and PSNR."""
-        self.sweep("--quiet")
+        self.swept()
         table = self.table()
         for row in table:
             size, psnr = int(row["file_bytes"]), float(row["psnr_db"])
@@ -167,7 +176,7 @@ class TablesTest(SweepCase):
 
     def test_side_by_side(self):
         """As many at a time as fit make the same table."""
-        self.sweep("--quiet")
+        self.swept()
         beside = self.folder / "beside"
         self.sweep("--quiet", "-j", "2", spec=self.spec(SPEC | {"threads": 1}, "beside.json"), out=beside)
         self.assertEqual(self.lasting(), self.lasting(beside))
@@ -244,7 +253,7 @@ class TablesTest(SweepCase):
 
 class ResumeTest(SweepCase):
     def test_nothing_is_repeated(self):
-        self.sweep("--quiet")
+        self.swept()
         before, table = self.records(), self.table()
         self.assertEqual(json.loads(self.sweep("--json").stdout)["steps_run"], 0)
         self.assertEqual(self.records(), before)
@@ -252,7 +261,7 @@ class ResumeTest(SweepCase):
         self.assertEqual(list(self.out.glob("work/*.svmm")), [])  # unless asked for
 
     def test_more_settings(self):
-        self.sweep("--quiet")
+        self.swept()
         before = self.records()
         more = json.loads(json.dumps(SPEC))
         more["codecs"][0]["options"]["quality"].append(75)
@@ -273,11 +282,11 @@ class ResumeTest(SweepCase):
         self.assertEqual((first, self.table()[0]["dims"]), ("9x9x9", "10x10x10"))
 
     def test_force(self):
-        self.sweep("--quiet")
+        self.swept()
         self.assertEqual(json.loads(self.sweep("--json", "--force").stdout)["steps_run"], 15 * 3)
 
     def test_damaged_record(self):
-        self.sweep("--quiet")
+        self.swept()
         table, victims = self.lasting(), sorted(self.out.glob("work/*.json"))
         victims[0].write_text("{", encoding="utf-8")
         victims[7].write_text("[]", encoding="utf-8")
@@ -305,7 +314,7 @@ class ResumeTest(SweepCase):
 
     def test_killed_twice(self):
         whole = self.folder / "whole"
-        self.sweep("--quiet", out=whole)
+        self.swept(whole)
         code, _, first = self.stop_after(7, signal.SIGKILL)
         self.assertEqual(code, -signal.SIGKILL)
         self.assertFalse((self.out / "results.csv").exists())
@@ -455,7 +464,7 @@ class FiguresTest(SweepCase):
 
 class BestTest(SweepCase):
     def test_against_the_table(self):
-        self.sweep("--quiet")
+        self.swept()
         table = self.table()
         for psnr, error in ((0, 255), (30, 255), (30, 20), (60, 0)):
             done = self.sweep("--json", "--best", f"psnr>={psnr}", "--best", f"max_abs_error<={error}", code=0)
@@ -466,6 +475,7 @@ class BestTest(SweepCase):
                 self.assertGreaterEqual(float(found["values"]["psnr_db"]), psnr)
 
     def test_none(self):
+        self.swept()
         done = self.sweep("--quiet", "--best", "percent<0.001", code=1)
         self.assertEqual(done.stdout, "sphere:24: no setting has percent < 0.001\nmenger:3: no setting has percent < 0.001\n")
 
