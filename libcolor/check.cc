@@ -7,6 +7,7 @@
 
 #include "formats/parallel.h"
 #include "formats/reservation.h"
+#include "libcolor/attributes/attribute_encode.h"
 #include "libcolor/part_codecs.h"
 #include "libcolor/store.h"
 #include "libcolor/surface/morton.h"
@@ -37,7 +38,11 @@ class Checker {
     }));
     VOX_CHECK(check_dag());
     const auto parts = static_cast<int64_t>(part_count(params_.color_count));
-    return parallel_for(ctx_, parts, [&](int64_t i) { return check_part(static_cast<uint64_t>(i)); });
+    VOX_CHECK(parallel_for(ctx_, parts, [&](int64_t i) { return check_part(static_cast<uint64_t>(i)); }));
+    const auto kinds = static_cast<int64_t>(volume_.attributes().size());
+    return parallel_for(ctx_, parts * kinds, [&](int64_t i) {
+      return check_values(static_cast<size_t>(i % kinds), static_cast<uint64_t>(i / kinds));
+    });
   }
 
  private:
@@ -218,6 +223,16 @@ class Checker {
     const std::string wrong =
         codec.check({bytes, store.part_bytes(part)}, params_, colors_of_part(params_.color_count, part));
     return wrong.empty() ? Status() : bad(fmt::format("chunk COLR 0.{}: {}", part, wrong));
+  }
+
+  Status check_values(size_t which, uint64_t part) const {
+    const AttributeStore& attributes = volume_.store().attributes();
+    const AttributeParams& own = attributes.params()[which];
+    VOX_TRY(const auto bytes, attributes.part(which, part, volume_.container()));
+    const std::string wrong = check_attribute_part(bytes, own, colors_of_part(params_.color_count, part));
+    return wrong.empty()
+               ? Status()
+               : bad(fmt::format("chunk ATTR {}.{}: {}", static_cast<int>(own.attribute), part, wrong));
   }
 
   const Volume& volume_;

@@ -10,6 +10,7 @@
 #include "formats/container.h"
 #include "formats/context.h"
 #include "formats/source.h"
+#include "libcolor/attributes/attribute_params.h"
 #include "libcolor/params.h"
 #include "libcolor/surface/surface.h"
 
@@ -21,17 +22,19 @@ class Store;
 struct Report {
   Params params;
   double most_error = 0;  ///< greatest distance of a decoded colour, in RGB or where the threshold is
+  std::vector<AttributeParams> attributes;
   double color_seconds = 0,
-         build_seconds = 0;  ///< of colours; of everything else, reading the source included
+         build_seconds = 0;  ///< of colours and attributes; of everything else, reading the source included
 };
 
 /// Checks whether the options are within their ranges and this build has their codec. Errors:
 /// ErrorCode::usage, saying which is not, or naming the package that is missing.
 Status validate(const Options& options);
 
-/// Compresses `source` into a container written to `sink`, in one pass. Memory: the DAG and some parts of
-/// colours; with Colors::all or along a Hilbert curve, all colours, twice; with palette, all colours. What is
-/// written does not depend on ctx.threads. Errors:
+/// Compresses `source`, with the attributes that it has, into a container written to `sink`, in one pass.
+/// Memory: the DAG and some parts of colours; with Colors::all or along a Hilbert curve, all colours, twice;
+/// with palette, all colours; the same of attributes, but for palette. What is written does not depend on
+/// ctx.threads. Errors:
 /// - ErrorCode::usage: those of `validate`.
 /// - ErrorCode::limit: more than 2^32 - 1 different leaf words, or words of the nodes of a height; as many
 ///   colours with Counts::pointer; more memory than ctx.memory allows.
@@ -68,12 +71,16 @@ class Volume {
   Result<std::shared_ptr<const Volume>> recolored(PartColors colors, uint64_t work_bytes,
                                                   MemoryBudget& memory) const;
 
-  /// Voxels are rgba32: opaque where there is one, else void.
+  /// Voxels are rgba32: where there is one its alpha is its opacity, at least 1, if it has that, else 255;
+  /// elsewhere void.
   const VolumeInfo& info() const { return info_; }
   const Params& params() const { return params_; }
   const Container& container() const { return *container_; }
   const Store& store() const { return *store_; }
 
+  /// What voxels have beside colours, under the same numbers (attribute_reader.h): those of
+  /// params().attributes, by number.
+  const std::vector<AttributeParams>& attributes() const;
   /// The colour with a number below params().color_count.
   Result<Rgb> color(uint64_t index) const;
   /// The colour of the voxel at a place inside the volume; nothing where there is none.
@@ -82,7 +89,7 @@ class Volume {
   Status decode(const Box& box, VoxelSpan out) const;
   /// Void, where the whole box is known to be that.
   std::optional<Voxel> uniform(const Box& box) const;
-  /// All voxels in Morton order, in runs.
+  /// All voxels in Morton order, in runs, with their attributes.
   Status for_each_voxel(const SurfaceSource::Sink& sink, Context& ctx) const;
   /// Those in a box inside the volume. Whether counts add up is known of the whole only: see `check`.
   Status for_each_voxel(const Box& box, const SurfaceSource::Sink& sink) const;

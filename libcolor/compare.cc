@@ -15,6 +15,41 @@ Lab lab_of(Rgb c) {
   return lab_of_linear(srgb_to_linear(c.r / 255.0), srgb_to_linear(c.g / 255.0), srgb_to_linear(c.b / 255.0));
 }
 
+/// The values of voxels that are in both.
+class Attributes {
+ public:
+  Attributes(AttributeSet set, const Volume& volume, SurfaceDiff& diff) : set_(set), diff_(diff) {
+    diff.same_attributes = set == volume.params().attributes;
+    if (!diff.same_attributes) return;
+    for (const AttributeParams& params : volume.attributes()) {
+      diff.attributes.push_back({params.attribute, 0, 0});
+      columns_.push_back(
+          {params, AttributeReader(volume.store(), volume.container(), volume.params(), params.attribute)});
+    }
+  }
+  void compare(const VoxelRun& run, size_t i, uint64_t index) {
+    for (size_t c = 0; c < columns_.size(); ++c) {
+      const AttributeParams& params = columns_[c].params;
+      const std::byte* const bytes = &run.attributes[i * set_.bytes() + set_.offset(params.attribute)];
+      const uint32_t was = value_at(bytes, kind_of(params.attribute).bytes);
+      const uint32_t is = columns_[c].reader.value(index);
+      if (was == is) continue;
+      AttributeDiff& diff = diff_.attributes[c];
+      ++diff.differing;
+      diff.most_error = std::max(diff.most_error, attribute_error(params.attribute, params.space, was, is));
+    }
+  }
+
+ private:
+  struct Column {
+    AttributeParams params;
+    AttributeReader reader;
+  };
+  AttributeSet set_;
+  SurfaceDiff& diff_;
+  std::vector<Column> columns_;
+};
+
 }  // namespace
 
 Result<SurfaceDiff> compare(SurfaceSource& source, const Volume& volume, Context& ctx) {
@@ -27,15 +62,18 @@ Result<SurfaceDiff> compare(SurfaceSource& source, const Volume& volume, Context
   double furthest_lab = 0;
   int64_t furthest = 0, furthest_channel = 0;
   const uint64_t end = uint64_t{1} << 3 * volume.params().height;
-  VOX_CHECK(source.read(ctx, [&](std::span<const SurfaceVoxel> run) -> Status {
+  Attributes attributes(source.attributes(), volume, diff);
+  VOX_CHECK(source.read(ctx, [&](const VoxelRun& run) -> Status {
     VOX_CHECK(check_interrupt());
-    diff.voxels += run.size();
-    for (const SurfaceVoxel& voxel : run) {
+    diff.voxels += run.voxels.size();
+    for (size_t i = 0; i < run.voxels.size(); ++i) {
+      const SurfaceVoxel& voxel = run.voxels[i];
       const Found found = voxel.place < end ? finder.find(voxel.place, 0) : Found{};
       if (!found.there) {
         diff.same_voxels = false;
         continue;
       }
+      attributes.compare(run, i, found.color);
       const Rgb color = reader.color(found.color);
       const std::array<int64_t, 3> apart = {color.r - voxel.color.r, color.g - voxel.color.g,
                                             color.b - voxel.color.b};

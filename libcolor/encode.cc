@@ -7,6 +7,8 @@
 #include "formats/parallel.h"
 #include "formats/reservation.h"
 #include "formats/volume_chunks.h"
+#include "libcolor/attributes/attribute_order.h"
+#include "libcolor/attributes/attribute_writer.h"
 #include "libcolor/blocks/block_encode.h"
 #include "libcolor/blocks/lab_colors.h"
 #include "libcolor/dag/color_order.h"
@@ -182,13 +184,14 @@ Status write_geometry(const Dag& dag, const Options& options, ContainerWriter& c
   return use_symmetric ? write_symmetric(*symmetric, container, p) : write_dag(dag, container, p);
 }
 
-/// Room for more colours, ahead of need: counted, and so is the copy while they move.
-Status make_room(std::vector<Rgb>& held, size_t more, Reservation& reservation) {
+/// Room for more of what all voxels have, ahead of need: counted, and so is the copy while they move.
+template <class T>
+Status make_room(std::vector<T>& held, size_t more, const char* what, Reservation& reservation) {
   if (held.capacity() - held.size() >= more) return {};
   const size_t before = held.capacity(), room = std::max(held.size() + more, before + before / 2);
-  VOX_CHECK(reservation.add(room * sizeof(Rgb), "room for all colors"));
+  VOX_CHECK(reservation.add(room * sizeof(T), what));
   held.reserve(room);
-  reservation.release(before * sizeof(Rgb));
+  reservation.release(before * sizeof(T));
   return {};
 }
 
@@ -210,6 +213,9 @@ Status validate(const Options& o) {
     return bad_usage(fmt::format("a palette of {} colors: expected 2 to 256, or 0", o.image_palette));
   if (o.geometry == Geometry::ssvdag && o.counts == Counts::pointer)
     return bad_usage("counts beside pointers: expected --counts node with --geometry ssvdag");
+  for (const auto& threshold : o.attribute_thresholds)
+    if (threshold && !(*threshold >= 0))
+      return bad_usage(fmt::format("threshold {} of an attribute: expected 0 or more", *threshold));
   VOX_CHECK(part_codec(o.codec).support(o));
   if (o.effort < 1 || o.effort > 9) return bad_usage(fmt::format("effort {}: expected 1 to 9", o.effort));
   return {};
@@ -234,20 +240,29 @@ Result<Report> encode(SurfaceSource& source, const Options& options, const Store
 
   ColorWriter colors(options, stored, container, ctx);
   VOX_CHECK(colors.begin());
+  const AttributeSet attributes = source.attributes();
+  AttributeWriter values(attributes, options, container, ctx);
+  VOX_CHECK(values.begin());
   DagBuilder builder(height, ctx);
   const bool all = options.colors == Colors::all, reorder = all || options.curve != Curve::morton;
   // Until the nodes above, or the palette, are known.
   const bool hold = reorder || options.codec == ColorCodec::palette;
   std::vector<Rgb> held;
+  std::vector<std::byte> held_values;
   Reservation reservation(*ctx.memory);
-  VOX_CHECK(source.read(ctx, [&](std::span<const SurfaceVoxel> run) -> Status {
+  VOX_CHECK(source.read(ctx, [&](const VoxelRun& run) -> Status {
+    if (run.attributes.size() != run.voxels.size() * attributes.bytes())
+      return fail(ErrorCode::internal, {}, "a run of voxels without the attributes that its source has");
     VOX_CHECK(builder.add(run));
     if (hold) {
-      VOX_CHECK(make_room(held, run.size(), reservation));
-      for (const SurfaceVoxel& voxel : run) held.push_back(voxel.color);
+      VOX_CHECK(make_room(held, run.voxels.size(), "room for all colors", reservation));
+      for (const SurfaceVoxel& voxel : run.voxels) held.push_back(voxel.color);
     } else {
-      for (const SurfaceVoxel& voxel : run) VOX_CHECK(colors.add(voxel.color));
+      for (const SurfaceVoxel& voxel : run.voxels) VOX_CHECK(colors.add(voxel.color));
     }
+    if (!reorder) return values.add(run.attributes);
+    VOX_CHECK(make_room(held_values, run.attributes.size(), "room for all attributes", reservation));
+    held_values.insert(held_values.end(), run.attributes.begin(), run.attributes.end());
     return {};
   }));
   VOX_TRY(Dag dag, builder.finish());
@@ -260,6 +275,8 @@ Result<Report> encode(SurfaceSource& source, const Options& options, const Store
   if (reorder) {
     const uint64_t count = other_counts ? recounted.color_count : dag.color_count;
     VOX_TRY(held, colors_in_order(dag, count, options.colors, options.curve, held, reservation));
+    VOX_TRY(held_values, attributes_in_order(dag, count, options.colors, options.curve, attributes,
+                                             held_values, reservation));
   }
   if (other_counts) dag = std::move(recounted);
   std::optional<Palette> palette;
@@ -271,6 +288,8 @@ Result<Report> encode(SurfaceSource& source, const Options& options, const Store
   }
   for (const Rgb color : held) VOX_CHECK(colors.add(color));
   VOX_CHECK(colors.finish());
+  VOX_CHECK(values.add(held_values));
+  VOX_CHECK(values.finish());
 
   Report report;
   Params& p = report.params;
@@ -282,6 +301,7 @@ Result<Report> encode(SurfaceSource& source, const Options& options, const Store
   p.height = height;
   p.leaf_voxels = dag.voxels;
   p.color_count = dag.color_count;
+  p.attributes = attributes;
   p.color_bytes = colors.bytes;
   p.blocks = colors.blocks;
   if (palette) p.palette_colors = static_cast<uint32_t>(palette->colors().size());
@@ -302,8 +322,9 @@ Result<Report> encode(SurfaceSource& source, const Options& options, const Store
   if (p.space == ErrorSpace::lab) report.most_error /= lab_scale;
   VOX_CHECK(container.add(params_kind, 0, 0, pack_params(p)));
   VOX_CHECK(container.finish());
-  report.color_seconds = colors.seconds;
-  report.build_seconds = seconds_since(start) - colors.seconds;
+  report.attributes = values.params();
+  report.color_seconds = colors.seconds + values.seconds;
+  report.build_seconds = seconds_since(start) - report.color_seconds;
   return report;
 }
 

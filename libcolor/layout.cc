@@ -39,6 +39,8 @@ std::vector<std::byte> pack_params(const Params& p) {
   }
   bytes[90] = static_cast<std::byte>(p.space);
   bytes[91] = static_cast<std::byte>(p.geometry);
+  for (size_t i = 0; i < attribute_kinds.size(); ++i)
+    if (p.attributes.has(static_cast<Attribute>(i))) bytes[92] |= static_cast<std::byte>(1 << i);
   store_le(&bytes[8], p.leaf_voxels);
   store_le(&bytes[16], p.color_count);
   store_le(&bytes[24], p.root);
@@ -99,6 +101,8 @@ Result<Params> unpack_params(std::span<const std::byte> bytes, const VolumeInfo&
     return bad(2, "counts beside pointers, which nodes with symmetry have not");
   if (p.geometry == Geometry::octree && load_le<uint32_t>(&bytes[24]) != 0)
     return bad(24, "a root, which an octree has not");
+  for (size_t i = 0; i < attribute_kinds.size(); ++i)
+    if ((field(92) >> i & 1) != 0) p.attributes.add(static_cast<Attribute>(i));
   p.height = field(4);
   p.weight_bits = field(5);
   p.leaf_voxels = number(8);

@@ -20,14 +20,6 @@ inline constexpr uint32_t palette_kind = chunk_kind("PALT");
 
 /// Height of the smallest grid that holds a volume.
 int height_of(Index3 dims);
-inline uint64_t part_count(uint64_t colors) {
-  return (colors >> part_log2) + ((colors & (part_colors - 1)) != 0);
-}
-/// Colours of a part.
-inline uint32_t colors_of_part(uint64_t colors, uint64_t part) {
-  const uint64_t left = colors - (part << part_log2);
-  return static_cast<uint32_t>(left < part_colors ? left : part_colors);
-}
 
 /// The chunk 'DAGP'.
 std::vector<std::byte> pack_params(const Params& params);

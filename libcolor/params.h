@@ -2,10 +2,12 @@
 // parts of the codec share. FORMAT.md, section 4.
 #pragma once
 
+#include <array>
 #include <cstdint>
 #include <optional>
 
 #include "formats/result.h"
+#include "libcolor/surface/attributes.h"
 
 namespace voxkit::color {
 
@@ -39,16 +41,20 @@ enum class ImageCurve : uint8_t {
   hilbert = 2,  ///< neighbours on the curve are neighbours in the image, too
 };
 
-/// How the colours at both ends of a block are held. Numbers are part of FORMAT.md.
+/// How the values at both ends of a block are held. Numbers are part of FORMAT.md.
 enum class Endpoints : uint8_t {
   rgb565 = 1,  ///< 16 bits each
   rgb888 = 2,  ///< 24 bits each
+  // Of attributes of one or two bytes, which are as colours that are otherwise black.
+  one = 3,
+  two = 4,
 };
 
 /// Where distances are measured. Numbers are part of FORMAT.md.
 enum class ErrorSpace : uint8_t {
-  rgb = 0,  ///< sRGB of 0 to 255
-  lab = 1,  ///< CIELAB
+  rgb = 0,    ///< sRGB of 0 to 255, or bytes of attributes
+  lab = 1,    ///< CIELAB
+  angle = 2,  ///< degrees between directions in two bytes (octahedral.h)
 };
 
 /// Of fws and vws: bits of a voxel's step between the ends of its block.
@@ -65,6 +71,15 @@ inline constexpr int leaf_height = 2;
 /// Colours of a part, which is stored by itself.
 inline constexpr int part_log2 = 20;
 inline constexpr uint32_t part_colors = 1 << part_log2;
+/// How many parts so many colours have.
+constexpr uint64_t part_count(uint64_t colors) {
+  return (colors >> part_log2) + ((colors & (part_colors - 1)) != 0);
+}
+/// Colours of a part.
+constexpr uint32_t colors_of_part(uint64_t colors, uint64_t part) {
+  const uint64_t left = colors - (part << part_log2);
+  return static_cast<uint32_t>(left < part_colors ? left : part_colors);
+}
 
 /// How colours are stored. Numbers are part of FORMAT.md.
 enum class ColorCodec : uint8_t {
@@ -117,7 +132,10 @@ struct Options {
   std::optional<Geometry> geometry;
   bool for_storage = false;
   Curve curve = Curve::morton;  ///< in which order voxels have their colours
-  int zstd = 0;                 ///< level of zstd for the file's chunks, 1 to 19; 0: as they are
+  /// By attribute, of fws and vws: greatest error of a value; not said: emissive as colours, or 9.56; opacity
+  /// 4; normal 3 degrees; rm 8.
+  std::array<std::optional<double>, attribute_kinds.size()> attribute_thresholds{};
+  int zstd = 0;  ///< level of zstd for the file's chunks, 1 to 19; 0: as they are
 };
 
 /// The blocks of what is encoded with these options.
@@ -146,6 +164,7 @@ struct Params {
   uint64_t dag_bytes = 0;    ///< of nodes and leaf words; of an octree, of all of it
   uint64_t color_bytes = 0;  ///< of all parts
   uint64_t macro_blocks = 0, blocks = 0;
+  AttributeSet attributes;  ///< beside colours
 };
 
 }  // namespace voxkit::color

@@ -97,6 +97,7 @@ Status Store::find_chunks(const Container& container, const Params& params) {
     sizes_.push_back(length);
   }
   found_ = std::make_unique<std::atomic<const std::byte*>[]>(parts);
+  VOX_CHECK(attributes_.find(container, params));
   return find_palette(container, params);
 }
 
@@ -215,14 +216,18 @@ const std::byte* Store::verify(uint64_t number, const Container& container) cons
     found_[number].store(chunk->data(), std::memory_order_release);
     return chunk->data();
   }
-  const std::lock_guard lock(mutex_);
-  if (status_) status_ = tl::unexpected<Error>(chunk.error());
+  report(chunk.error());
   return nullptr;
 }
 
 void Store::report(const Container& container, const std::string& what) const {
   const std::lock_guard lock(mutex_);
   if (status_) status_ = bad_input(container.name(), what);
+}
+
+void Store::report(const Error& error) const {
+  const std::lock_guard lock(mutex_);
+  if (status_) status_ = tl::unexpected<Error>(error);
 }
 
 void Store::decode_images(const Container& container, const Params& params) {
@@ -247,8 +252,7 @@ void Store::decode_parts(DecodedParts::Decode decode, uint64_t work_bytes) {
 std::shared_ptr<const DecodedParts::Part> Store::decoded(uint64_t number) const {
   auto part = decoded_->get(number);
   if (part) return std::move(*part);
-  const std::lock_guard lock(mutex_);
-  if (status_) status_ = tl::unexpected<Error>(part.error());
+  report(part.error());
   return nullptr;
 }
 

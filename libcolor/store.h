@@ -6,6 +6,7 @@
 #include <mutex>
 #include <vector>
 
+#include "libcolor/attribute_reader.h"
 #include "libcolor/dag/dag_view.h"
 #include "libcolor/layout.h"
 #include "libcolor/octree/octree_reader.h"
@@ -44,10 +45,12 @@ class Store {
   /// tells.
   bool decodes_parts() const { return decoded_ != nullptr; }
   std::shared_ptr<const DecodedParts::Part> decoded(uint64_t number) const;
+  const AttributeStore& attributes() const { return attributes_; }
   /// The first damage that was met.
   Status status() const;
   /// Of damage that a reader finds: it becomes `status`, unless there is one.
   [[gnu::cold]] void report(const Container& container, const std::string& what) const;
+  [[gnu::cold]] void report(const Error& error) const;
 
  private:
   Status check_geometry(const Container& container, const Params& params) const;
@@ -65,6 +68,7 @@ class Store {
   std::vector<size_t> parts_;
   std::vector<uint64_t> sizes_;  ///< of parts
   PaletteBytes palette_;
+  AttributeStore attributes_;
   std::unique_ptr<std::atomic<const std::byte*>[]> found_;
   mutable std::mutex mutex_;
   mutable std::unique_ptr<OctreeReader> octree_;

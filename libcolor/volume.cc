@@ -13,8 +13,8 @@
 namespace voxkit::color {
 namespace {
 
-Voxel opaque(Rgb c) {
-  return Voxel::of(static_cast<uint32_t>(c.r | c.g << 8 | c.b << 16) | 0xff000000u);
+Voxel voxel_of(Rgb c, uint32_t alpha) {
+  return Voxel::of(static_cast<uint32_t>(c.r | c.g << 8 | c.b << 16) | alpha << 24);
 }
 
 /// Calls visit(word, corner, color, state) for the leaf words that touch a box, in Morton order, through an
@@ -79,6 +79,10 @@ Result<std::shared_ptr<const Volume>> Volume::recolored(PartColors colors, uint6
   return volume;
 }
 
+const std::vector<AttributeParams>& Volume::attributes() const {
+  return store_->attributes().params();
+}
+
 Result<Rgb> Volume::color(uint64_t index) const {
   if (index >= params_.color_count) return fail(ErrorCode::internal, container_->name(), "no such color");
   ColorReader reader(*store_, *container_, params_);
@@ -109,12 +113,18 @@ Status Volume::decode(const Box& box, VoxelSpan out) const {
   fill(out, box.size(), VoxelFormat::rgba32, {});
   if (params_.leaf_voxels == 0) return {};
   ColorReader reader(*store_, *container_, params_);
+  std::optional<AttributeReader> opacity;
+  if (params_.attributes.has(Attribute::opacity))
+    opacity.emplace(*store_, *container_, params_, Attribute::opacity);
   VOX_TRY(const bool complete,
           walk_box(*this, box, [&](uint64_t leaf, Index3 corner, uint64_t color, OrderState state) {
             if (leaf == 0) return false;
             for (uint64_t left = leaf & leaf_within(corner, box); left != 0; left &= left - 1) {
               const auto bit = static_cast<uint32_t>(std::countr_zero(left));
-              const Voxel voxel = opaque(reader.color(color + leaf_index(leaf, bit, params_.colors, state)));
+              const uint64_t index = color + leaf_index(leaf, bit, params_.colors, state);
+              // What is there is not void.
+              const uint32_t alpha = opacity ? std::max(1u, opacity->value(index)) : 255;
+              const Voxel voxel = voxel_of(reader.color(index), alpha);
               const Index3 to = corner + Index3(morton_place(bit)) - box.lo;
               std::memcpy(out.row(to.y, to.z) + to.x * 4, voxel.bytes.data(), 4);
             }
@@ -155,17 +165,20 @@ Status Volume::for_each_voxel(const Box& box, const SurfaceSource::Sink& sink) c
   if (params_.leaf_voxels == 0 || box.empty()) return {};
   const bool whole = box == info_.box();
   ColorReader reader(*store_, *container_, params_);
+  AttributesReader attributes(*store_, *container_, params_);
   constexpr uint64_t run_voxels = 1 << 16;
   std::vector<SurfaceVoxel> run;
   run.reserve(run_voxels + 64);
+  std::vector<std::byte> values;
   uint64_t found = 0, flushed = 0;
   Status status;
   const auto flush = [&] {
     flushed = found;
     status = check_interrupt();
     if (status) status = store_->status();
-    if (status && !run.empty()) status = sink(run);
+    if (status && !run.empty()) status = sink({run, values});
     run.clear();
+    values.clear();
     return status.has_value();
   };
   const auto complete =
@@ -183,7 +196,9 @@ Status Volume::for_each_voxel(const Box& box, const SurfaceSource::Sink& sink) c
         if (leaf == 0 || found > params_.leaf_voxels) return false;
         for (uint64_t left = leaf & leaf_within(corner, box); left != 0; left &= left - 1) {
           const auto bit = static_cast<uint32_t>(std::countr_zero(left));
-          run.push_back({first | bit, reader.color(color + leaf_index(leaf, bit, params_.colors, state))});
+          const uint64_t index = color + leaf_index(leaf, bit, params_.colors, state);
+          run.push_back({first | bit, reader.color(index)});
+          attributes.append(index, values);
         }
         return found - flushed < run_voxels || flush();
       });

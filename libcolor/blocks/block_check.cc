@@ -20,7 +20,8 @@ std::string check_block_part(std::span<const std::byte> part, const Params& para
       return wrong("not its blocks");
     next = macro.last;
     if (macro.raw) {
-      if (macro.weights % 8 != 0 || macro.weights + uint64_t{size} * 24 > view.weight_bits())
+      if (macro.weights % 8 != 0 ||
+          macro.weights + uint64_t{size} * 8 * value_bytes(params.endpoints) > view.weight_bits())
         return wrong("colors behind the end");
       continue;
     }

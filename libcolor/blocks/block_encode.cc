@@ -5,6 +5,7 @@
 
 #include "libcolor/blocks/bit_writer.h"
 #include "libcolor/blocks/block_plan.h"
+#include "libcolor/blocks/directions.h"
 #include "libcolor/blocks/lab_colors.h"
 
 namespace voxkit::color {
@@ -39,8 +40,9 @@ class PartWriter {
   void add_raw(std::span<const Rgb> colors) {
     weights_.align();
     begin_macro_block(raw_macro_block);
+    const auto bits = static_cast<int>(8 * value_bytes(endpoints_));
     for (const Rgb c : colors)
-      weights_.add(c.r | static_cast<uint32_t>(c.g) << 8 | static_cast<uint32_t>(c.b) << 16, 24);
+      weights_.add(c.r | static_cast<uint32_t>(c.g) << 8 | static_cast<uint32_t>(c.b) << 16, bits);
   }
   EncodedPart finish() {
     weights_.align();
@@ -79,11 +81,13 @@ class PartWriter {
     std::array<std::byte, 10> header;
     store_le(header.data(), word);
     const Rgb a = block.fit.a, b = block.fit.b;
-    if (endpoints_ == Endpoints::rgb888) {
-      const std::array<uint8_t, 6> ends = {a.r, a.g, a.b, b.r, b.g, b.b};
-      for (size_t i = 0; i < ends.size(); ++i) header[4 + i] = static_cast<std::byte>(ends[i]);
-    } else {
+    if (endpoints_ == Endpoints::rgb565) {
       store_le(&header[4], block.bits == 0 ? to_single(a) : to_565(a) | to_565(b) << 16);
+    } else {
+      const std::array<uint8_t, 6> ends = {a.r, a.g, a.b, b.r, b.g, b.b};
+      const size_t own = value_bytes(endpoints_);
+      for (size_t i = 0; i < 2 * own; ++i)
+        header[4 + i] = static_cast<std::byte>(ends[i < own ? i : 3 + i - own]);
     }
     headers_.insert(headers_.end(), header.begin(), header.begin() + header_bytes(endpoints_));
     ++part_.blocks;
@@ -120,6 +124,7 @@ uint32_t allowed_of(const BlockOptions& options) {
   constexpr double greatest = 442;  // no two colours are further apart
   const double threshold = std::min(options.threshold, greatest);
   if (options.space == ErrorSpace::rgb) return static_cast<uint32_t>(threshold * threshold);
+  if (options.space == ErrorSpace::angle) return squared_chord(threshold);
   // Where points are not exact the threshold holds none the less.
   const double within = lab_scale * std::max(0.0, threshold - lab_precision);
   return static_cast<uint32_t>(within * within);
@@ -133,7 +138,10 @@ Endpoints endpoints_for(double threshold, ErrorSpace space) {
 }
 
 EncodedPart encode_part(std::span<const Rgb> colors, const BlockOptions& options) {
-  const Endpoints endpoints = endpoints_for(options.threshold, options.space);
+  return encode_part(colors, endpoints_for(options.threshold, options.space), options);
+}
+
+EncodedPart encode_part(std::span<const Rgb> colors, Endpoints endpoints, const BlockOptions& options) {
   const uint32_t allowed = allowed_of(options);
   const size_t macro_blocks = (colors.size() + macro_block_colors - 1) / macro_block_colors;
   PartWriter writer(endpoints, macro_blocks);
@@ -143,7 +151,7 @@ EncodedPart encode_part(std::span<const Rgb> colors, const BlockOptions& options
     const MacroColors macro(own, options.space);
     const Fitter fitter(macro, endpoints, allowed, options.effort);
     const std::vector<PlannedBlock> plan = plan_of(macro, fitter, endpoints, allowed, options);
-    if (cost_of(plan, endpoints) >= 24 * own.size())
+    if (cost_of(plan, endpoints) >= 8 * value_bytes(endpoints) * own.size())
       writer.add_raw(own);
     else
       writer.add(macro, fitter, plan);

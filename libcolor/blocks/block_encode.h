@@ -26,5 +26,8 @@ Endpoints endpoints_for(double threshold, ErrorSpace space = ErrorSpace::rgb);
 
 /// Encodes 1 to 2^20 colours as a part.
 EncodedPart encode_part(std::span<const Rgb> colors, const BlockOptions& options);
+/// The same with ends of that kind, which must do for the threshold. Of Endpoints::one and two, colours have
+/// one or two channels; the others are 0.
+EncodedPart encode_part(std::span<const Rgb> colors, Endpoints endpoints, const BlockOptions& options);
 
 }  // namespace voxkit::color

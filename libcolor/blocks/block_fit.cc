@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cmath>
 
+#include "libcolor/blocks/directions.h"
 #include "libcolor/blocks/lab_colors.h"
 
 namespace voxkit::color {
@@ -61,6 +62,11 @@ std::array<float, 3> floats(Rgb c) {
   return {static_cast<float>(c.r), static_cast<float>(c.g), static_cast<float>(c.b)};
 }
 
+/// Where a colour is in the space in which distances are measured, other than RGB.
+std::array<float, 3> point_in(ErrorSpace space, Rgb color) {
+  return space == ErrorSpace::lab ? lab_colors().point(color) : direction_point({color.r, color.g});
+}
+
 }  // namespace
 
 MacroColors::MacroColors(std::span<const Rgb> colors, ErrorSpace space)
@@ -77,13 +83,13 @@ MacroColors::MacroColors(std::span<const Rgb> colors, ErrorSpace space)
     channels_[1][i] = static_cast<float>(g);
     channels_[2][i] = static_cast<float>(b);
   }
-  if (space != ErrorSpace::lab) return;
+  if (space == ErrorSpace::rgb) return;
   for (auto& channel : lab_) channel.resize(colors.size() + vector_size);
   for (size_t i = 0; i < colors.size(); ++i) {
     // Neighbours are often equal.
     const LabPoint point = i > 0 && colors[i] == colors[i - 1]
                                ? LabPoint{lab_[0][i - 1], lab_[1][i - 1], lab_[2][i - 1]}
-                               : lab_colors().point(colors[i]);
+                               : point_in(space, colors[i]);
     for (size_t c = 0; c < 3; ++c) lab_[c][i] = point[c];
   }
 }
@@ -111,7 +117,7 @@ Rgb Fitter::quantised(const std::array<float, 3>& color) const {
   const auto to = [](float v, float most) {
     return static_cast<uint32_t>(std::clamp(v, 0.0f, 255.0f) * (most / 255.0f) + 0.5f);
   };
-  if (endpoints_ == Endpoints::rgb888)
+  if (endpoints_ != Endpoints::rgb565)
     return {static_cast<uint8_t>(to(color[0], 255)), static_cast<uint8_t>(to(color[1], 255)),
             static_cast<uint8_t>(to(color[2], 255))};
   return {from_5_bits(to(color[0], 31)), from_6_bits(to(color[1], 63)), from_5_bits(to(color[2], 31))};
@@ -134,7 +140,7 @@ Fit Fitter::fit(uint32_t first, uint32_t last, int bits) const {
                                                   uint32_t most, uint8_t* weights) const {
   std::array<LabPoint, 1 << most_weight_bits> steps;
   const uint32_t count = fit.a == fit.b ? 1 : most + 1;
-  for (uint32_t w = 0; w < count; ++w) steps[w] = lab_colors().point(mix(fit.a, fit.b, w, most));
+  for (uint32_t w = 0; w < count; ++w) steps[w] = point_in(colors_.space(), mix(fit.a, fit.b, w, most));
   const ColorRun run{
       {colors_.lab_channel(0) + first, colors_.lab_channel(1) + first, colors_.lab_channel(2) + first},
       last - first};

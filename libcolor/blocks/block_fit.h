@@ -25,7 +25,7 @@ class MacroColors {
   Sums sums(uint32_t first, uint32_t last) const;
   /// Channel c of all colours, as whole numbers; whole vectors may be read from any of them.
   const float* channel(size_t c) const { return channels_[c].data(); }
-  /// The same in CIELAB, times lab_scale, if the space is that.
+  /// The same in CIELAB, times lab_scale, or as directions, of length direction_scale, if the space is that.
   const float* lab_channel(size_t c) const { return lab_[c].data(); }
   ErrorSpace space() const { return space_; }
 

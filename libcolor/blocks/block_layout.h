@@ -13,7 +13,8 @@
 // A header: a word with the number of the block's first colour in its macro block (14 bits), the bits of a
 // weight less 1 (2 bits) and the first bit of its weights, from those of the macro block (16 bits;
 // `no_weights`: one colour for all); then the endpoints. With `raw_macro_block` colours lie where weights
-// would, 24 bits each, without blocks.
+// would, 24 bits each, without blocks. Attributes of one or two bytes are colours whose other channels are
+// black, and not stored: headers have 6 or 8 bytes, and raw values one or two.
 #pragma once
 
 #include <array>
@@ -32,8 +33,12 @@ inline constexpr uint32_t no_weights = 0xffff;
 inline constexpr uint64_t raw_macro_block = uint64_t{1} << 63;
 inline constexpr uint32_t part_head = 8, macro_head = 16, part_tail = 8;
 
+/// Of a value that is stored as it is.
+VOX_HD constexpr uint32_t value_bytes(Endpoints endpoints) {
+  return endpoints == Endpoints::one ? 1 : endpoints == Endpoints::two ? 2 : 3;
+}
 VOX_HD constexpr uint32_t header_bytes(Endpoints endpoints) {
-  return endpoints == Endpoints::rgb565 ? 8 : 10;
+  return endpoints == Endpoints::rgb565 ? 8 : 4 + 2 * value_bytes(endpoints);
 }
 
 /// 5 and 6 bits to 8, the highest ones repeated.
@@ -125,9 +130,9 @@ class PartView {
     block.first = word & 0x3fff;
     block.weights = word >> 16;
     block.bits = block.weights == no_weights ? 0 : (word >> 14 & 3) + 1;
-    if (endpoints_ == Endpoints::rgb888) {
-      block.a = rgb_at(bytes + 4);
-      block.b = rgb_at(bytes + 7);
+    if (endpoints_ != Endpoints::rgb565) {
+      block.a = value_at(bytes + 4);
+      block.b = value_at(bytes + 4 + value_bytes(endpoints_));
     } else if (block.bits == 0) {
       block.a = block.b = from_single(load_le<uint32_t>(bytes + 4));
     } else {
@@ -157,9 +162,9 @@ class PartView {
     return mix(block.a, block.b, load_le<uint32_t>(weights_ + (at >> 3)) >> (at & 7) & most, most);
   }
   VOX_HD Rgb raw_color(const MacroBlock& macro, uint32_t color) const {
-    const uint64_t at = macro.weights / 8 + uint64_t{color} * 3;
-    if (at + 3 > weight_bits_ / 8) return {};
-    return rgb_at(weights_ + at);
+    const uint64_t at = macro.weights / 8 + uint64_t{color} * value_bytes(endpoints_);
+    if (at + value_bytes(endpoints_) > weight_bits_ / 8) return {};
+    return value_at(weights_ + at);
   }
   /// Colour `index` of the part.
   VOX_HD Rgb color(uint32_t index) const {
@@ -173,8 +178,11 @@ class PartView {
   }
 
  private:
-  VOX_HD static Rgb rgb_at(const std::byte* p) {
-    return {static_cast<uint8_t>(p[0]), static_cast<uint8_t>(p[1]), static_cast<uint8_t>(p[2])};
+  VOX_HD Rgb value_at(const std::byte* p) const {
+    Rgb value{static_cast<uint8_t>(p[0])};
+    if (endpoints_ != Endpoints::one) value.g = static_cast<uint8_t>(p[1]);
+    if (value_bytes(endpoints_) == 3) value.b = static_cast<uint8_t>(p[2]);
+    return value;
   }
   VOX_HD const std::byte* header(uint32_t block) const {
     return headers_ + uint64_t{block} * header_bytes(endpoints_);

@@ -107,18 +107,22 @@ EncodedPart encode_palette_part(std::span<const Rgb> colors, const Palette& pale
     numbers[i] = palette.index_of(colors[i]);
     part.add_error(colors[i], palette.colors()[numbers[i]]);
   }
-  const auto palette_colors = static_cast<uint32_t>(palette.colors().size());
+  encode_palette_numbers(numbers, static_cast<uint32_t>(palette.colors().size()), effort, part);
+  return part;
+}
+
+void encode_palette_numbers(std::span<const uint16_t> numbers, uint32_t palette_colors, int effort,
+                            EncodedPart& part) {
   const Plan plan = plan_of(numbers, palette_colors, uint32_t{32} << effort);
   part.blocks = plan.blocks.size();
   part.bytes = bytes_of(numbers, plan, palette_colors);
   // Where fewer entries were shared than was thought.
-  const Plan direct = direct_plan(static_cast<uint32_t>(colors.size()));
+  const Plan direct = direct_plan(static_cast<uint32_t>(numbers.size()));
   if (std::vector<std::byte> bytes = bytes_of(numbers, direct, palette_colors);
       bytes.size() < part.bytes.size()) {
     part.blocks = direct.blocks.size();
     part.bytes = std::move(bytes);
   }
-  return part;
 }
 
 }  // namespace voxkit::color

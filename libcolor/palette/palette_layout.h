@@ -127,6 +127,13 @@ class PaletteView {
     const uint64_t entry = uint64_t{block.palette} + index;
     return entry < entry_count_ ? bits_at(entries_, entry * bits_, bits_) : no_color;
   }
+  /// The same of color `index` of the part.
+  VOX_HD uint32_t number(uint32_t index) const {
+    if (bytes_ == nullptr || index >= colors_) return no_color;
+    const MacroBlock macro = macro_block(index / macro_block_colors);
+    const uint32_t within = index % macro_block_colors, at = find_block(macro, within);
+    return at == macro.last ? no_color : color_in(macro, block(at), within);
+  }
 
  private:
   /// Up to 16 bits.
@@ -152,9 +159,11 @@ class PaletteReader {
     first_ = last_ = 0;
   }
   /// Colour `index` of the part, which has it.
-  Rgb color(uint32_t index) {
-    if ((index < first_ || index >= last_) && !find(index)) return {};
-    return palette_.color(view_.color_in(macro_, block_, index % macro_block_colors));
+  Rgb color(uint32_t index) { return palette_.color(number(index)); }
+  /// Its number in the palette; none of its colours where it is not there.
+  uint32_t number(uint32_t index) {
+    if ((index < first_ || index >= last_) && !find(index)) return PaletteView::no_color;
+    return view_.color_in(macro_, block_, index % macro_block_colors);
   }
 
  private:

@@ -31,12 +31,13 @@ libcolor/octree   -> formats libpage libcolor/surface libcolor/terms libcolor/da
 libcolor/faces    -> formats formats/mesh libcolor/surface
 libcolor/blocks   -> formats libcolor/surface libcolor/terms
 libcolor/palette  -> formats libcolor/surface libcolor/terms libcolor/blocks
+libcolor/attributes -> formats libcolor/surface libcolor/terms libcolor/dag libcolor/blocks libcolor/palette
 libcolor/textures -> formats formats/image libcolor/surface libcolor/terms libcolor/blocks
-libcolor          -> formats formats/image libcolor/surface libcolor/terms libcolor/dag libcolor/octree libcolor/blocks libcolor/palette libcolor/textures
+libcolor          -> formats formats/image libcolor/surface libcolor/terms libcolor/dag libcolor/octree libcolor/blocks libcolor/palette libcolor/attributes libcolor/textures
 libcolor/edit     -> formats libcolor libcolor/surface libcolor/terms libcolor/dag
 libmetrics        -> formats formats/image
 librender         -> formats formats/image
-librender/cast    -> formats librender libsvmm libsvmm/packed libcolor libcolor/dag libcolor/surface
+librender/cast    -> formats librender libsvmm libsvmm/packed libcolor libcolor/dag libcolor/attributes libcolor/surface
 librender/dvr     -> formats librender librender/cast libsvmm libsvmm/packed libvq
 librender/device  -> formats librender librender/cast librender/dvr libsvmm libvq libcolor libcolor/dag
 """

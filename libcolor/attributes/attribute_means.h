@@ -1,0 +1,46 @@
+// The attributes of a cell, from those of the voxels in it.
+#pragma once
+
+#include <array>
+#include <span>
+
+#include "libcolor/surface/attributes.h"
+#include "libcolor/surface/linear_light.h"
+
+namespace voxkit::color {
+
+/// What voxels have, added up. Emission is added up in linear light, normals as vectors of one length.
+struct AttributeSums {
+  struct Vote {
+    uint32_t id = 0;
+    uint64_t voxels = 0;
+  };
+  uint64_t voxels = 0, opacity = 0;
+  std::array<uint64_t, 3> light{};
+  std::array<int64_t, 3> normal{};
+  std::array<uint64_t, 2> rm{};
+  std::array<Vote, 8> votes{};  ///< of octants
+  uint32_t vote_count = 0;
+
+  /// Adds those of an octant: up to 8 of them, each a voxel or elected.
+  void add(const AttributeSums& octant);
+  /// What most voxels in the octants have is the id of all.
+  void elect();
+};
+
+class AttributeMeans {
+ public:
+  explicit AttributeMeans(AttributeSet set) : set_(set), tables_(light_tables()) {}
+  /// Those of a voxel.
+  AttributeSums of(std::span<const std::byte> voxel) const;
+  /// Writes those of a cell of a height with at least one voxel: means, each rounded once; of opacity that
+  /// over the whole cell, where no voxel is 0, but at least 1; of normals their direction; of ids the one
+  /// that most of the octants' voxels have, each octant all those of its own, and of equally many the least.
+  void put(const AttributeSums& elected, int height, std::span<std::byte> cell) const;
+
+ private:
+  AttributeSet set_;
+  const LightTables& tables_;
+};
+
+}  // namespace voxkit::color
