@@ -10,10 +10,12 @@
 
 namespace voxkit {
 
-/// A voxel: its place, and its colour as R, G, B in sRGB.
+/// A voxel: its place, its colour as R, G, B in sRGB, and the number of that in a palette, where it is of
+/// one.
 struct ModelVoxel {
   std::array<int32_t, 3> place;
   std::array<uint8_t, 3> color;
+  uint8_t number = 0;
 };
 
 class VoxelSink {

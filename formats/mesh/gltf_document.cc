@@ -25,8 +25,8 @@ std::optional<Component> component_of(std::optional<uint64_t> type) {
 
 class Reader {
  public:
-  Reader(const Json& file, std::optional<uint64_t> own_bytes, const std::string& path, Context& ctx)
-      : file_(file), own_bytes_(own_bytes), path_(path), ctx_(ctx) {}
+  Reader(const Json& file, std::optional<uint64_t> own_bytes, const std::string& path, Context& ctx, bool rm)
+      : file_(file), own_bytes_(own_bytes), path_(path), ctx_(ctx), rm_(rm) {}
 
   Result<Document> read() {
     if (!file_.is_object()) return Item{file_, "the file", 0, path_}.bad("expected an object");
@@ -37,7 +37,7 @@ class Reader {
     VOX_CHECK(read_accessors());
     VOX_CHECK(read_images());
     VOX_CHECK(read_pictures(file_, path_, out_));
-    VOX_CHECK(read_materials(file_, path_, out_));
+    VOX_CHECK(read_materials(file_, path_, out_, rm_));
     VOX_CHECK(read_meshes());
     VOX_CHECK(read_nodes());
     VOX_CHECK(check_trees());
@@ -440,6 +440,7 @@ class Reader {
   std::optional<uint64_t> own_bytes_;
   const std::string& path_;
   Context& ctx_;
+  bool rm_;  ///< roughness and metalness are wanted
   std::set<uint32_t> fallback_;
   Document out_;
 };
@@ -460,7 +461,7 @@ Placement placement_of(const glm::dvec3& translation, const std::array<double, 4
 }
 
 Result<Document> read_document(std::string_view text, std::optional<uint64_t> own_bytes,
-                               const std::string& path, Context& ctx) {
+                               const std::string& path, Context& ctx, bool rm) {
   // What the parser makes of it: 80 bytes for each value at most, and the text of strings.
   const auto values = static_cast<uint64_t>(std::count_if(
       text.begin(), text.end(), [](char c) { return c == '[' || c == '{' || c == ',' || c == ':'; }));
@@ -470,7 +471,7 @@ Result<Document> read_document(std::string_view text, std::optional<uint64_t> ow
   try {
     json = Json::parse(text.begin(), text.end(), nullptr, /*allow_exceptions=*/false);
     if (json.is_discarded()) return bad_input(path, "corrupt glTF file: its text is not JSON");
-    VOX_TRY(Document document, Reader(json, own_bytes, path, ctx).read());
+    VOX_TRY(Document document, Reader(json, own_bytes, path, ctx, rm).read());
     VOX_TRY(document.memory, Reservation::take(text.size(), "the text of the mesh", ctx));
     return document;
   } catch (const std::bad_alloc&) {

@@ -84,7 +84,7 @@ struct PictureInfo {
 };
 struct Material {
   MeshMaterial material;
-  PictureInfo color, emission;
+  PictureInfo color, emission, rm;
 };
 
 using Attributes = std::map<std::string, uint32_t>;  ///< accessors by name
@@ -140,8 +140,8 @@ struct Document {
 
 /// Reads the text. `own_bytes`: how many bytes of buffers are in the file itself. Errors: ErrorCode::input
 /// with what is wrong, also for a glTF of another version and for an extension that is required and not
-/// known; ErrorCode::limit.
+/// known; ErrorCode::limit. `rm`: roughness and metalness are wanted.
 Result<Document> read_document(std::string_view text, std::optional<uint64_t> own_bytes,
-                               const std::string& path, Context& ctx);
+                               const std::string& path, Context& ctx, bool rm = false);
 
 }  // namespace voxkit::gltf

@@ -96,7 +96,7 @@ inline std::string text_of(const Item& item, const char* name) {
 
 /// Pictures and materials: gltf_materials.cc. `document` has images already.
 Status read_pictures(const Json& file, const std::string& path, Document& document);
-Status read_materials(const Json& file, const std::string& path, Document& document);
+Status read_materials(const Json& file, const std::string& path, Document& document, bool rm);
 /// What parse_voxel_grid makes of such an object: voxel_grid.cc.
 std::optional<VolumeInfo> voxel_grid_of(const Json& grid);
 

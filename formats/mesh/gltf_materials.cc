@@ -50,10 +50,31 @@ Result<PictureInfo> read_info(const Item& owner, const char* name, const Documen
   return info;
 }
 
-Status read_material(const Item& item, Document& document) {
+/// Roughness and metalness of the last material; gloss is the opposite of roughness, and no metal.
+Status read_rm(const Item& item, const Json* rough, const Json* gloss, Document& document) {
+  Material& out = document.materials.back();
+  double roughness = 1, metalness = gloss ? 0 : 1;
+  bool sound = true;
+  if (gloss) {
+    double factor = 1;
+    sound = number(item.below(*gloss), "glossinessFactor", factor);
+    roughness = 1 - factor;
+  } else if (rough) {
+    const Item part = item.below(*rough);
+    sound = number(part, "roughnessFactor", roughness) && number(part, "metallicFactor", metalness);
+    VOX_TRY(out.rm, read_info(part, "metallicRoughnessTexture", document));
+  }
+  if (!sound) return item.bad("expected numbers for its factors");
+  out.material.roughness = static_cast<float>(roughness);
+  out.material.metalness = static_cast<float>(metalness);
+  return {};
+}
+
+Status read_material(const Item& item, Document& document, bool rm) {
   Material& out = document.materials.emplace_back();
   MeshMaterial& material = out.material;
   material.name = text_of(item, "name");
+  material.number = static_cast<uint32_t>(item.index);
   if (material.name.empty()) material.name = std::to_string(item.index);
   const Json* const gloss = item.extension("KHR_materials_pbrSpecularGlossiness");
   const Json* const rough = item.find("pbrMetallicRoughness");
@@ -67,6 +88,7 @@ Status read_material(const Item& item, Document& document) {
     sound &= numbers<4>(part, "baseColorFactor", material.color);
     VOX_TRY(out.color, read_info(part, "baseColorTexture", document));
   }
+  if (rm) VOX_CHECK(read_rm(item, rough, gloss, document));
   sound &= numbers<3>(item, "emissiveFactor", material.emission);
   VOX_TRY(out.emission, read_info(item, "emissiveTexture", document));
   if (const Json* const more = item.extension("KHR_materials_emissive_strength")) {
@@ -93,11 +115,12 @@ Status read_material(const Item& item, Document& document) {
   };
   use(out.color, material.wrap_u, material.wrap_v, material.filter);
   use(out.emission, material.emission_wrap_u, material.emission_wrap_v, material.emission_filter);
+  use(out.rm, material.rm_wrap_u, material.rm_wrap_v, material.rm_filter);
   return {};
 }
 
 /// What of materials is no colour: named once for a file.
-void note_materials(const Json& file, Document& document) {
+void note_materials(const Json& file, Document& document, bool rm) {
   const auto any = [&](const char* first, const char* second) {
     for (const Json& material : list_of(file, "materials")) {
       const auto at = material.is_object() ? material.find(first) : material.end();
@@ -121,8 +144,9 @@ void note_materials(const Json& file, Document& document) {
   const auto add = [&](const char* what) { dropped += (dropped.empty() ? "" : ", ") + std::string(what); };
   if (any("normalTexture", nullptr)) add("normal maps");
   if (any("occlusionTexture", nullptr)) add("occlusion maps");
-  if (any("pbrMetallicRoughness", "metallicRoughnessTexture")) add("maps of metal and roughness");
-  if (says_other("metallicFactor", 0) || says_other("roughnessFactor", 1)) add("metal and roughness");
+  if (!rm && any("pbrMetallicRoughness", "metallicRoughnessTexture")) add("maps of metal and roughness");
+  if (!rm && (says_other("metallicFactor", 0) || says_other("roughnessFactor", 1)))
+    add("metal and roughness");
   if (!dropped.empty()) document.notes.push_back(fmt::format("dropped: {}: only colors are kept", dropped));
 }
 
@@ -144,11 +168,11 @@ Status read_pictures(const Json& file, const std::string& path, Document& docume
   return {};
 }
 
-Status read_materials(const Json& file, const std::string& path, Document& document) {
+Status read_materials(const Json& file, const std::string& path, Document& document, bool rm) {
   size_t index = 0;
   for (const Json& json : list_of(file, "materials"))
-    VOX_CHECK(read_material({json, "material", index++, path}, document));
-  note_materials(file, document);
+    VOX_CHECK(read_material({json, "material", index++, path}, document, rm));
+  note_materials(file, document, rm);
   return {};
 }
 

@@ -19,7 +19,7 @@ class PrimitiveReader {
         path_(path),
         ctx_(ctx) {}
 
-  Result<Geometry> read(bool skinned) {
+  Result<Geometry> read(bool skinned, bool normals) {
     const auto position = primitive_.attributes.find("POSITION");
     if (position == primitive_.attributes.end()) return std::move(out_);
     count_ = document_.accessors[position->second].count;
@@ -34,8 +34,10 @@ class PrimitiveReader {
       out_.positions[i][static_cast<int>(c)] += change;
     }));
     if (primitive_.attributes.contains("COLOR_0")) VOX_CHECK(read_colors());
+    if (normals && primitive_.attributes.contains("NORMAL")) VOX_CHECK(read_normals());
     if (first_.picture != none) VOX_CHECK(read_uvs(first_, out_.uvs));
     if (second_.picture != none) VOX_CHECK(read_uvs(second_, out_.emission_uvs));
+    if (third_.picture != none) VOX_CHECK(read_uvs(third_, out_.rm_uvs));
     if (skinned) VOX_CHECK(read_joints());
     VOX_CHECK(read_corners());
     return std::move(out_);
@@ -51,19 +53,21 @@ class PrimitiveReader {
     return {};
   }
 
-  /// Which picture coordinates are wanted: of colours, or of emission where only that has a picture; and of
-  /// emission, where they are others.
+  /// Which picture coordinates are wanted: of the first of colours, emission, roughness that has a picture;
+  /// and of the others, where they are others.
   Status read_material_uses() {
     if (primitive_.material == none) return {};
     const Material& material = document_.materials[primitive_.material];
-    first_ = material.color.picture != none ? material.color : material.emission;
-    if (material.color.picture != none && material.emission.picture != none &&
-        (material.color.channel != material.emission.channel ||
-         material.color.transform != material.emission.transform))
-      second_ = material.emission;
-    for (const PictureInfo& info : {first_, second_})
+    const auto others = [](const PictureInfo& a, const PictureInfo& b) {
+      return a.picture != none && (a.channel != b.channel || a.transform != b.transform);
+    };
+    for (const PictureInfo* info : {&material.rm, &material.emission, &material.color})
+      if (info->picture != none) first_ = *info;
+    if (others(material.emission, first_)) second_ = material.emission;
+    if (others(material.rm, first_)) third_ = material.rm;
+    for (const PictureInfo& info : {first_, second_, third_})
       out_.lacks_uvs |= info.picture != none && !primitive_.attributes.contains(name_of(info));
-    if (out_.lacks_uvs) first_ = second_ = {};
+    if (out_.lacks_uvs) first_ = second_ = third_ = {};
     return {};
   }
   static std::string name_of(const PictureInfo& info) { return fmt::format("TEXCOORD_{}", info.channel); }
@@ -163,6 +167,17 @@ class PrimitiveReader {
     });
   }
 
+  Status read_normals() {
+    VOX_TRY(const auto values, attribute("NORMAL", 3, 3));
+    VOX_CHECK(hold(count_ * sizeof(glm::dvec3)));
+    out_.normals.resize(count_);
+    for (uint64_t i = 0; i < count_; ++i)
+      out_.normals[i] = {values.values[3 * i], values.values[3 * i + 1], values.values[3 * i + 2]};
+    return add_targets("NORMAL", 3, [&](uint64_t i, uint32_t c, double change) {
+      out_.normals[i][static_cast<int>(c)] += change;
+    });
+  }
+
   Status read_uvs(const PictureInfo& info, std::vector<glm::vec2>& to) {
     const std::string name = name_of(info);
     VOX_TRY(const auto values, attribute(name, 2, 2));
@@ -221,7 +236,7 @@ class PrimitiveReader {
   const std::string& path_;
   Context& ctx_;
   uint64_t count_ = 0;
-  PictureInfo first_, second_;
+  PictureInfo first_, second_, third_;
   std::vector<std::string> names_;  ///< of what is unpacked
   std::optional<DracoMesh> unpacked_;
   Geometry out_;
@@ -230,9 +245,9 @@ class PrimitiveReader {
 }  // namespace
 
 Result<Geometry> read_primitive(const Document& document, Buffers& buffers, const Primitive& primitive,
-                                std::span<const double> weights, bool skinned, const std::string& path,
-                                Context& ctx) {
-  return PrimitiveReader(document, buffers, primitive, weights, path, ctx).read(skinned);
+                                std::span<const double> weights, bool skinned, bool normals,
+                                const std::string& path, Context& ctx) {
+  return PrimitiveReader(document, buffers, primitive, weights, path, ctx).read(skinned, normals);
 }
 
 }  // namespace voxkit::gltf

@@ -60,8 +60,14 @@ Result<GltfParts> parts_of(std::span<const std::byte> bytes, const std::string& 
 
 class SceneReader {
  public:
-  SceneReader(const Document& document, Buffers& buffers, const std::string& path, Context& ctx)
-      : document_(document), buffers_(buffers), path_(path), ctx_(ctx), builder_(path, ctx) {}
+  SceneReader(const Document& document, Buffers& buffers, const std::string& path, Context& ctx,
+              const MeshOptions& options)
+      : document_(document),
+        buffers_(buffers),
+        path_(path),
+        ctx_(ctx),
+        options_(options),
+        builder_(path, ctx) {}
 
   Result<MeshParts> read() {
     VOX_CHECK(place_nodes());
@@ -93,6 +99,7 @@ class SceneReader {
     for (const std::string& note : document_.notes) builder_.note(note);
     for (const std::string& note : notes_) builder_.note(note);
     MeshParts parts = std::move(builder_).finish();
+    parts.mesh.says_emission = parts.mesh.says_rm = true;
     if (grids_.size() == 1) parts.mesh.grid = std::move(grids_[0]);
     return parts;
   }
@@ -182,7 +189,11 @@ class SceneReader {
     auto [at, is_new] = materials_.try_emplace(index, 0);
     if (!is_new) return at->second;
     if (index == none) {
-      at->second = builder_.add_material({});
+      // As the specification has it: a metal, without roughness being said.
+      MeshMaterial blank;
+      blank.number = static_cast<uint32_t>(document_.materials.size());
+      blank.metalness = 1;
+      at->second = builder_.add_material(std::move(blank));
       return at->second;
     }
     const Material& material = document_.materials[index];
@@ -206,6 +217,9 @@ class SceneReader {
     if (material.emission.picture != none) {
       VOX_TRY(maps.emission, image_of(material.emission));
     }
+    if (material.rm.picture != none) {
+      VOX_TRY(maps.rm, image_of(material.rm));
+    }
     at->second = builder_.add_material(material.material, std::move(maps));
     return at->second;
   }
@@ -220,8 +234,8 @@ class SceneReader {
         notes_.insert("dropped: lines");
         continue;
       }
-      VOX_TRY(Geometry geometry,
-              read_primitive(document_, buffers_, primitive, weights, node.skin != none, path_, ctx_));
+      VOX_TRY(Geometry geometry, read_primitive(document_, buffers_, primitive, weights, node.skin != none,
+                                                options_.normals, path_, ctx_));
       if (geometry.positions.empty()) {
         notes_.insert("dropped: primitives without vertices");
         continue;
@@ -231,7 +245,9 @@ class SceneReader {
       if (node.skin != none) VOX_CHECK(bend(document_.skins[node.skin], node, geometry));
       VOX_CHECK(builder_.add_attributes({.uvs = !geometry.uvs.empty(),
                                          .emission_uvs = !geometry.emission_uvs.empty(),
-                                         .colors = !geometry.colors.empty()}));
+                                         .rm_uvs = !geometry.rm_uvs.empty(),
+                                         .colors = !geometry.colors.empty(),
+                                         .normals = !geometry.normals.empty()}));
       const uint64_t vertices = geometry.positions.size(), corners = geometry.corners.size();
       if (vertices > UINT32_MAX / places.size() || corners > (uint64_t{1} << 40) / places.size())
         return bad_input(path_, fmt::format("a mesh of {} x {} vertices: expected less than 2^32",
@@ -253,7 +269,9 @@ class SceneReader {
       vertex.position = place(geometry.positions[i]);
       if (!geometry.uvs.empty()) vertex.uv = geometry.uvs[i];
       vertex.emission_uv = geometry.emission_uvs.empty() ? vertex.uv : geometry.emission_uvs[i];
+      vertex.rm_uv = geometry.rm_uvs.empty() ? vertex.uv : geometry.rm_uvs[i];
       if (!geometry.colors.empty()) vertex.color = geometry.colors[i];
+      if (!geometry.normals.empty()) vertex.normal = glm::vec3(place.normal(geometry.normals[i]));
       VOX_CHECK(builder_.add_vertex(vertex));
     }
     const auto corner = [&](size_t i) { return first + geometry.corners[i]; };
@@ -298,7 +316,8 @@ class SceneReader {
     const Placement& own = global_[static_cast<size_t>(&node - document_.nodes.data())];
     for (size_t v = 0; v < geometry.positions.size(); ++v) {
       const glm::dvec3 from = geometry.positions[v];
-      glm::dvec3 to(0);
+      glm::dvec3 to(0), normal(0);
+      const bool has_normal = !geometry.normals.empty();
       double sum = 0;
       for (size_t set = 0; set < geometry.joints.size(); ++set)
         for (size_t k = 0; k < 4; ++k) {
@@ -307,10 +326,13 @@ class SceneReader {
           const float joint = geometry.joints[set].values[4 * v + k];
           if (!(joint >= 0 && joint < static_cast<float>(joints.size())))
             return bad(fmt::format("a skin: joint {}: expected one below {}", joint, joints.size()));
-          to += weight * joints[static_cast<size_t>(joint)](from);
+          const Placement& place = joints[static_cast<size_t>(joint)];
+          to += weight * place(from);
+          if (has_normal) normal += weight * place.normal(geometry.normals[v]);
           sum += weight;
         }
       geometry.positions[v] = sum > 0 ? to / sum : own(from);
+      if (has_normal) geometry.normals[v] = sum > 0 ? normal : own.normal(geometry.normals[v]);
     }
     return {};
   }
@@ -319,6 +341,7 @@ class SceneReader {
   Buffers& buffers_;
   const std::string& path_;
   Context& ctx_;
+  const MeshOptions& options_;
   MeshBuilder builder_;
   std::vector<Placement> global_;
   std::vector<VolumeInfo> grids_;
@@ -330,13 +353,14 @@ class SceneReader {
 
 }  // namespace
 
-Result<MeshParts> read_gltf(const std::string& path, MeshFolder& folder, Context& ctx) {
+Result<MeshParts> read_gltf(const std::string& path, MeshFolder& folder, Context& ctx,
+                            const MeshOptions& options) {
   VOX_TRY(const auto file, MappedFile::open(path));
   VOX_TRY(const GltfParts parts, parts_of(file->bytes(), path));
   const auto own_bytes = parts.own_bytes ? std::optional<uint64_t>(parts.own_bytes->size()) : std::nullopt;
-  VOX_TRY(const Document document, read_document(parts.json, own_bytes, path, ctx));
+  VOX_TRY(const Document document, read_document(parts.json, own_bytes, path, ctx, options.rm));
   Buffers buffers(document, parts.own_bytes.value_or(std::span<const std::byte>{}), file, path, folder, ctx);
-  return SceneReader(document, buffers, path, ctx).read();
+  return SceneReader(document, buffers, path, ctx, options).read();
 }
 
 }  // namespace voxkit

@@ -11,6 +11,7 @@ namespace voxkit {
 /// their skins as the nodes have them, which is at rest. Triangles and points are read, lines are dropped.
 /// The extensions that gltf_document.cc names are understood. Buffers are looked for in `folder`.
 /// Errors: ErrorCode::input, ErrorCode::limit.
-Result<MeshParts> read_gltf(const std::string& path, MeshFolder& folder, Context& ctx);
+Result<MeshParts> read_gltf(const std::string& path, MeshFolder& folder, Context& ctx,
+                            const MeshOptions& options = {});
 
 }  // namespace voxkit

@@ -97,6 +97,8 @@ class HeaderReader {
     header_.color = layout.color;
     header_.flags = 15;
     header_.withheld = std::byte{static_cast<uint8_t>(format >= 6 ? 4 : minor >= 1 ? 0x80 : 0)};
+    header_.label = format >= 6 ? 16 : 15;
+    header_.label_mask = format < 6 && minor >= 1 ? 0x1f : 0xff;
     for (int a = 0; a < 3; ++a) {
       header_.scale[a] = at<double>(131 + 8 * static_cast<size_t>(a));
       header_.offset[a] = at<double>(155 + 8 * static_cast<size_t>(a));

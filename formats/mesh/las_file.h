@@ -21,6 +21,8 @@ struct Header {
   glm::dvec3 scale{1}, offset{0};           ///< stored whole numbers n are at n * scale + offset
   size_t color = 0;                         ///< where of a point red, green and blue are; 0: nowhere
   size_t flags = 0;                         ///< where its flags are
+  size_t label = 0;                         ///< where its class is
+  uint8_t label_mask = 0xff;                ///< which bits of that
   std::byte withheld{0};                    ///< which of them says that it is to be left out
   std::vector<std::string> fields_dropped;  ///< all but places, intensity and colours
   std::vector<std::string> notes;           ///< what else of the file is left out

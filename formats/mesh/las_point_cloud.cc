@@ -12,8 +12,9 @@ namespace {
 
 class LasPointCloud final : public PointCloud {
  public:
-  LasPointCloud(std::shared_ptr<const MappedFile> file, las::Header header)
-      : file_(std::move(file)), header_(std::move(header)), all_(header_.points) {
+  LasPointCloud(std::shared_ptr<const MappedFile> file, las::Header header, bool labels)
+      : file_(std::move(file)), header_(std::move(header)), all_(header_.points), labels_(labels) {
+    has_.labels = true;
     notes_ = header_.notes;
   }
 
@@ -37,6 +38,7 @@ class LasPointCloud final : public PointCloud {
         [&](uint64_t i) { before.release(record_at(i)); }));
 
     std::vector<std::string> dropped = h.fields_dropped;
+    if (labels_) std::erase(dropped, "classification");
     if (greatest_color > 0) {
       color_ = h.color;
       shift_ = greatest_color > 255 ? 8 : 0;
@@ -67,6 +69,7 @@ class LasPointCloud final : public PointCloud {
           const std::byte* const at = record(i);
           if (is_withheld(at)) return false;
           for (int a = 0; a < 3; ++a) point.at[a] = load_le<int32_t>(at + 4 * a) * h.scale[a] + h.offset[a];
+          if (labels_) point.label = std::to_integer<uint32_t>(at[h.label]) & h.label_mask;
           if (color_ != 0) {
             for (size_t c = 0; c < 3; ++c)
               point.color[c] = static_cast<uint8_t>(load_le<uint16_t>(at + color_ + 2 * c) >> shift_);
@@ -90,6 +93,7 @@ class LasPointCloud final : public PointCloud {
   std::shared_ptr<const MappedFile> file_;
   las::Header header_;
   uint64_t all_;  ///< points, also those that are withheld
+  bool labels_;   ///< are wanted
   size_t color_ = 0;
   int shift_ = 0;                    ///< of colours
   uint32_t greatest_intensity_ = 0;  ///< 0: points are white
@@ -97,10 +101,11 @@ class LasPointCloud final : public PointCloud {
 
 }  // namespace
 
-Result<std::unique_ptr<const PointCloud>> open_las_points(const std::string& path) {
+Result<std::unique_ptr<const PointCloud>> open_las_points(const std::string& path,
+                                                          const PointExtras& wanted) {
   VOX_TRY(auto file, MappedFile::open(path));
   VOX_TRY(las::Header header, las::read_header(file->bytes(), path));
-  auto points = std::make_unique<LasPointCloud>(std::move(file), std::move(header));
+  auto points = std::make_unique<LasPointCloud>(std::move(file), std::move(header), wanted.labels);
   VOX_CHECK(points->look_through());
   return points;
 }

@@ -6,6 +6,7 @@
 #include <charconv>
 #include <cstdlib>
 #include <map>
+#include <optional>
 #include <span>
 #include <string_view>
 
@@ -145,6 +146,38 @@ std::array<Color, 256> default_palette() {
   return palette;
 }
 
+/// A material of a colour, as version 0.98 and later ones write it, and older ones with one weight for all.
+VoxelMaterial material_of(const std::map<std::string_view, std::string_view>& words) {
+  // What is no number, or beyond its range, is as if it were not said.
+  const auto value = [&](const char* name) -> std::optional<float> {
+    const auto at = words.find(name);
+    if (at == words.end()) return std::nullopt;
+    float number = 0;
+    const std::string_view text = at->second;
+    const auto [end, error] = std::from_chars(text.data(), text.data() + text.size(), number);
+    if (error != std::errc() || end != text.data() + text.size() || !(number >= 0 && number <= 1e6f))
+      return std::nullopt;
+    return number;
+  };
+  const auto type = words.find("_type");
+  const std::string_view kind = type == words.end() ? "_diffuse" : type->second;
+  const float weight = value("_weight").value_or(1);
+  VoxelMaterial out;
+  if (kind == "_metal") {
+    out.metalness = std::min(value("_metal").value_or(weight), 1.0f);
+  } else if (kind == "_glass") {
+    const auto clear = value("_trans");
+    out.opacity = 1 - std::min(clear ? *clear : value("_alpha").value_or(weight), 1.0f);
+  } else if (kind == "_emit") {
+    out.emission = std::min(value("_emit").value_or(weight) * (1 + value("_flux").value_or(0)), 1.0f);
+  } else if (kind != "_diffuse" && kind != "_plastic") {
+    out.special = true;
+  }
+  if (kind != "_diffuse")
+    out.roughness = std::min(value("_rough").value_or(kind == "_emit" ? 1.0f : 0.1f), 1.0f);
+  return out;
+}
+
 class File {
  public:
   File(Bytes bytes, const std::string& name, Context& ctx, uint32_t frame)
@@ -177,10 +210,6 @@ class File {
       scene_.notes.push_back(fmt::format("frame {} of {} is read: --frame N takes another", frame_, frames));
     if (hidden_)
       scene_.notes.push_back(fmt::format("dropped: {} parts of the scene that are hidden", hidden_));
-    int special = 0;
-    for (size_t i = 0; i < 256; ++i) special += used_[i] && special_[i];
-    if (special)
-      scene_.notes.push_back(fmt::format("dropped: materials of {} colors that are glass or shine", special));
     return std::move(scene_);
   }
 
@@ -224,8 +253,7 @@ class File {
     } else if (kind == tag("MATL")) {
       VOX_TRY(const uint32_t id, chunk.number());
       VOX_TRY(const auto words, chunk.dictionary());
-      if (const auto type = words.find("_type"); type != words.end() && id < special_.size())
-        special_[id] = type->second != "_diffuse" && type->second != "_metal" && type->second != "_plastic";
+      if (id < scene_.materials.size()) scene_.materials[id] = material_of(words);
     } else if (kind == tag("nTRN")) {
       return read_transform(chunk);
     } else if (kind == tag("nGRP") || kind == tag("nSHP")) {
@@ -358,10 +386,10 @@ class File {
           return bad_input(name_,
                            fmt::format("model {}: a voxel at {}: expected within {}", number, v, furthest));
       const auto color = std::to_integer<size_t>(model.voxels[4 * i + 3]);
-      used_[color] = true;
       scene_.voxels.push_back(
           {{static_cast<int32_t>(at[0]), static_cast<int32_t>(at[2]), static_cast<int32_t>(-1 - at[1])},
-           palette_[color]});
+           palette_[color],
+           static_cast<uint8_t>(color)});
     }
     return {};
   }
@@ -375,7 +403,6 @@ class File {
   std::array<Color, 256> palette_ = default_palette();
   std::map<uint32_t, Node> nodes_;
   std::map<uint32_t, bool> hidden_layers_;
-  std::array<bool, 256> special_{}, used_{};  ///< of colours: of another material; there are voxels of it
   uint64_t placed_ = 0, visited_ = 0, hidden_ = 0;
   VoxelScene scene_;
 };

@@ -14,10 +14,19 @@
 
 namespace voxkit {
 
+/// What the voxels of a colour are made of, 0..1 each.
+struct VoxelMaterial {
+  float opacity = 1;   ///< of glass
+  float emission = 0;  ///< which share of its colour it gives as light
+  float roughness = 1, metalness = 0;
+  bool special = false;  ///< it is something else: a cloud, say
+};
+
 /// All voxels of a scene, models in the order in which they are placed: of several at one place the last one
 /// counts. The axes are turned so that y points up, as renderers have it: x, z and -y of the file.
 struct VoxelScene {
-  std::vector<ModelVoxel> voxels;
+  std::vector<ModelVoxel> voxels;  ///< numbers are those of palette and materials, 1 to 255
+  std::array<VoxelMaterial, 256> materials;
   Reservation memory;              ///< of these, in ctx.memory
   std::vector<std::string> notes;  ///< what the file says and voxels cannot, a sentence each
 };

@@ -4,6 +4,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <glm/geometric.hpp>
 #include <map>
 #include <utility>
 
@@ -38,12 +39,13 @@ void bring_into_range(glm::vec4& color) {
   for (int c = 0; c < 4; ++c) color[c] = within_one(color[c]);
 }
 
-Result<MeshParts> read_parts(const std::string& path, MeshFolder& folder, Context& ctx) {
-  if (has_ending(path, ".ply")) return read_ply(path, ctx);
-  if (has_ending(path, ".obj")) return read_obj(path, folder, ctx);
+Result<MeshParts> read_parts(const std::string& path, MeshFolder& folder, Context& ctx,
+                             const MeshOptions& options) {
+  if (has_ending(path, ".ply")) return read_ply(path, ctx, options);
+  if (has_ending(path, ".obj")) return read_obj(path, folder, ctx, options);
   if (has_ending(path, ".stl")) return read_stl(path, ctx);
   if (has_ending(path, ".3ds")) return read_3ds(path, ctx);
-  return read_gltf(path, folder, ctx);
+  return read_gltf(path, folder, ctx, options);
 }
 
 /// Drops the points that are nowhere, and says how many.
@@ -75,6 +77,8 @@ Status check_mesh(Mesh& mesh, const std::string& path) {
   const size_t vertices = mesh.positions.size();
   if ((!mesh.uvs.empty() && mesh.uvs.size() != vertices) ||
       (!mesh.emission_uvs.empty() && mesh.emission_uvs.size() != vertices) ||
+      (!mesh.rm_uvs.empty() && mesh.rm_uvs.size() != vertices) ||
+      (!mesh.normals.empty() && mesh.normals.size() != vertices) ||
       (!mesh.colors.empty() && mesh.colors.size() != vertices))
     return bad_input(path, "corrupt mesh: vertices without all of their attributes");
   const bool had_triangles = !mesh.triangles.empty();
@@ -94,7 +98,7 @@ Status check_mesh(Mesh& mesh, const std::string& path) {
                          fmt::format("corrupt mesh: triangle {}: a corner at ({}, {}, {}): expected finite "
                                      "coordinates, as a float holds them",
                                      i, p.x, p.y, p.z));
-      for (const auto* uvs : {&mesh.uvs, &mesh.emission_uvs})
+      for (const auto* uvs : {&mesh.uvs, &mesh.emission_uvs, &mesh.rm_uvs})
         if (!uvs->empty() && (!std::isfinite((*uvs)[v].x) || !std::isfinite((*uvs)[v].y)))
           return bad_input(path,
                            fmt::format("corrupt mesh: triangle {}: texture coordinates ({}, {}): expected "
@@ -107,8 +111,12 @@ Status check_mesh(Mesh& mesh, const std::string& path) {
   mesh.triangles.resize(kept);
   VOX_CHECK(check_points(mesh, path));
   for (glm::vec4& color : mesh.colors) bring_into_range(color);
+  for (glm::vec3& normal : mesh.normals)
+    if (!(glm::dot(normal, normal) < 1e30f)) normal = glm::vec3(0);
   for (MeshMaterial& material : mesh.materials) {
     bring_into_range(material.color);
+    material.roughness = within_one(material.roughness);
+    material.metalness = within_one(material.metalness);
     // Above 1 nothing is there, however opaque.
     if (!(material.alpha_cutoff > 1)) material.alpha_cutoff = within_one(material.alpha_cutoff);
     for (int c = 0; c < 3; ++c)
@@ -184,6 +192,9 @@ Status load_pictures(MeshParts& parts, const std::string& path, MeshFolder& fold
     if (used[i] && maps.emission.used() && material.emits()) {
       VOX_TRY(material.emission_picture, picture_of(maps.emission, {}, material.name));
     }
+    if (used[i] && maps.rm.used()) {
+      VOX_TRY(material.rm_picture, picture_of(maps.rm, {}, material.name));
+    }
   }
   if (masks)
     mesh.notes.push_back(
@@ -195,7 +206,7 @@ Result<Mesh> read_mesh(const std::string& path, Context& ctx, const MeshOptions&
   if (!is_mesh_name(path))
     return bad_input(path, "not a mesh: expected .obj, .gltf, .glb, .ply, .stl or .3ds");
   MeshFolder folder(path, options.allow_outside);
-  VOX_TRY(MeshParts parts, read_parts(path, folder, ctx));
+  VOX_TRY(MeshParts parts, read_parts(path, folder, ctx, options));
   VOX_CHECK(check_mesh(parts.mesh, path));
   VOX_CHECK(load_pictures(parts, path, folder, ctx));
   if (std::string note = folder.note(); !note.empty()) parts.mesh.notes.push_back(std::move(note));

@@ -46,6 +46,16 @@ struct MeshMaterial {
   PictureWrap emission_wrap_u = PictureWrap::repeat, emission_wrap_v = PictureWrap::repeat;
   PictureFilter emission_filter = PictureFilter::linear;
   bool emits() const { return emission.r > 0 || emission.g > 0 || emission.b > 0; }
+
+  /// 0..1; they multiply the green and the blue of their picture, which are no light. Of what says nothing: a
+  /// dull material that is no metal.
+  float roughness = 1, metalness = 0;
+  int32_t rm_picture = -1;  ///< index into Mesh::pictures, or -1
+  PictureWrap rm_wrap_u = PictureWrap::repeat, rm_wrap_v = PictureWrap::repeat;
+  PictureFilter rm_filter = PictureFilter::linear;
+
+  /// Which material of the file it is; not said: as it is counted by MeshBuilder.
+  uint32_t number = UINT32_MAX;
 };
 
 struct MeshTriangle {
@@ -65,6 +75,8 @@ struct Mesh {
   /// bottom right one. Finite.
   std::vector<glm::vec2> uvs;
   std::vector<glm::vec2> emission_uvs;  ///< of emission pictures; none: these go by `uvs`, too
+  std::vector<glm::vec2> rm_uvs;        ///< and of pictures of roughness and metalness
+  std::vector<glm::vec3> normals;       ///< of the vertices, or none, finite; 0 where there is none
   std::vector<glm::vec4> colors;        ///< of the vertices, or none: linear light and alpha, 0..1
   std::vector<MeshTriangle> triangles;  ///< all of them have an area
   std::vector<MeshPoint> points;
@@ -72,16 +84,19 @@ struct Mesh {
   std::vector<Picture> pictures;
   /// The grid of voxels whose faces these are, as the file says (voxel_grid.h); in the mesh's coordinates.
   std::optional<VolumeInfo> grid;
-  std::vector<std::string> notes;  ///< what the file says and the mesh cannot, a sentence each
+  bool says_emission = false, says_rm = false;  ///< whether such files say what gives light, and roughness
+  std::vector<std::string> notes;               ///< what the file says and the mesh cannot, a sentence each
   std::vector<Reservation> memory;
 };
 
 /// Whether a name ends like a mesh: .obj, .gltf, .glb, .ply, .stl or .3ds.
 bool is_mesh_name(const std::string& name);
 
-/// What a user allows a mesh to do.
+/// What a user allows a mesh to do, and what is wanted of it beside colours.
 struct MeshOptions {
   bool allow_outside = false;  ///< to name files outside of its own folder
+  bool normals = false;        ///< those of vertices
+  bool rm = false;             ///< roughness and metalness
 };
 
 /// Reads a mesh: the triangles and points of all nodes of the scene in their places, polygons split, lines

@@ -26,6 +26,11 @@ Status MeshBuilder::add_attributes(const Attributes& more) {
     VOX_CHECK(begin(true, has_.emission_uvs, emission_uvs_, glm::vec2(0)));
     std::copy(uvs_.values.begin(), uvs_.values.end(), emission_uvs_.values.begin());
   }
+  if (more.rm_uvs && !has_.rm_uvs) {
+    VOX_CHECK(begin(true, has_.rm_uvs, rm_uvs_, glm::vec2(0)));
+    std::copy(uvs_.values.begin(), uvs_.values.end(), rm_uvs_.values.begin());
+  }
+  VOX_CHECK(begin(more.normals, has_.normals, normals_, glm::vec3(0)));
   return begin(more.colors, has_.colors, colors_, glm::vec4(1));
 }
 
@@ -36,7 +41,9 @@ Status MeshBuilder::make_room(uint64_t vertices, uint64_t triangles, uint64_t po
   VOX_CHECK(positions_.make_room(vertices, what, ctx_));
   if (has_.uvs) VOX_CHECK(uvs_.make_room(vertices, what, ctx_));
   if (has_.emission_uvs) VOX_CHECK(emission_uvs_.make_room(vertices, what, ctx_));
+  if (has_.rm_uvs) VOX_CHECK(rm_uvs_.make_room(vertices, what, ctx_));
   if (has_.colors) VOX_CHECK(colors_.make_room(vertices, what, ctx_));
+  if (has_.normals) VOX_CHECK(normals_.make_room(vertices, what, ctx_));
   VOX_CHECK(triangles_.make_room(triangles, what, ctx_));
   return points_.make_room(points, what, ctx_);
 }
@@ -46,7 +53,9 @@ Result<uint32_t> MeshBuilder::add_vertex(const MeshVertex& vertex) {
   positions_.values.push_back(vertex.position);
   if (has_.uvs) uvs_.values.push_back(vertex.uv);
   if (has_.emission_uvs) emission_uvs_.values.push_back(vertex.emission_uv);
+  if (has_.rm_uvs) rm_uvs_.values.push_back(vertex.rm_uv);
   if (has_.colors) colors_.values.push_back(vertex.color);
+  if (has_.normals) normals_.values.push_back(vertex.normal);
   return static_cast<uint32_t>(vertices() - 1);
 }
 
@@ -88,6 +97,7 @@ Status MeshBuilder::add_strip(std::span<const uint32_t> corners, uint32_t materi
 }
 
 uint32_t MeshBuilder::add_material(MeshMaterial material, MeshParts::Maps maps) {
+  if (material.number == UINT32_MAX) material.number = numbered_++;
   parts_.mesh.materials.push_back(std::move(material));
   parts_.maps.push_back(std::move(maps));
   plain_.push_back(UINT32_MAX);
@@ -96,7 +106,7 @@ uint32_t MeshBuilder::add_material(MeshMaterial material, MeshParts::Maps maps) 
 
 uint32_t MeshBuilder::without_pictures(uint32_t index) {
   const MeshParts::Maps& maps = parts_.maps[index];
-  if (!maps.color.used() && !maps.opacity.used() && !maps.emission.used()) return index;
+  if (!maps.color.used() && !maps.opacity.used() && !maps.emission.used() && !maps.rm.used()) return index;
   if (plain_[index] == UINT32_MAX) {
     MeshMaterial copy = parts_.mesh.materials[index];
     const uint32_t made = add_material(std::move(copy));
@@ -116,7 +126,9 @@ MeshParts MeshBuilder::finish() && {
   take(positions_, mesh.positions);
   take(uvs_, mesh.uvs);
   take(emission_uvs_, mesh.emission_uvs);
+  take(rm_uvs_, mesh.rm_uvs);
   take(colors_, mesh.colors);
+  take(normals_, mesh.normals);
   take(triangles_, mesh.triangles);
   take(points_, mesh.points);
   return std::move(parts_);

@@ -111,6 +111,12 @@ class MtlReader {
     } else if (is_any(keyword, {"map_ks", "map_ns", "map_bump", "bump", "norm", "disp", "map_disp", "decal",
                                 "refl", "map_pr", "map_pm", "map_ps", "map_tr", "map_refl"})) {
       library_.dropped.insert(keyword);
+    } else if (library_.rm && (keyword == "pr" || keyword == "pm")) {
+      const std::string_view word = lines_.word();
+      const auto value = number_of(word);
+      if (!value || !(std::abs(*value) < 1e30))
+        return bad(fmt::format("{} {}: expected a number", keyword, word));
+      (keyword == "pr" ? material.roughness : material.metalness) = static_cast<float>(*value);
     } else if (is_any(keyword, {"ks", "pr", "pm", "ps", "pc", "tf"})) {
       // Highlights, metal, sheen and tinted glass; programs write "Ks 0 0 0" into every material.
       const auto value = number_of(lines_.word());

@@ -19,18 +19,26 @@ constexpr const char* library_word = "material library";
 
 /// Numbers of a corner, from 0.
 struct Corner {
-  uint32_t vertex = none, uv = none;
+  uint32_t vertex = none, uv = none, normal = none;
 };
 
 class ObjReader {
  public:
-  ObjReader(std::span<const std::byte> bytes, const std::string& path, MeshFolder& folder, Context& ctx)
-      : bytes_(bytes), path_(path), folder_(folder), ctx_(ctx), builder_(path, ctx) {}
+  ObjReader(std::span<const std::byte> bytes, const std::string& path, MeshFolder& folder, Context& ctx,
+            const MeshOptions& options)
+      : bytes_(bytes),
+        path_(path),
+        folder_(folder),
+        ctx_(ctx),
+        wants_normals_(options.normals),
+        builder_(path, ctx) {
+    library_.rm = options.rm;
+  }
 
   /// Vertices and materials first: what uses them may come before.
   Result<MeshParts> read() {
     VOX_CHECK(read_vertices());
-    if (positions_.values.size() >= none || uvs_.values.size() >= none)
+    if (positions_.values.size() >= none || uvs_.values.size() >= none || normals_.values.size() >= none)
       return bad_input(
           path_, fmt::format("a mesh of {} vertices: expected less than 2^32", positions_.values.size()));
     VOX_CHECK(begin_mesh());
@@ -42,6 +50,7 @@ class ObjReader {
       builder_.note("dropped: numbers of texture coordinates at corners: the file has no such coordinates");
     if (too_bright_) builder_.note("colors of vertices are above 1: they are taken as 1");
     MeshParts parts = std::move(builder_).finish();
+    parts.mesh.says_emission = parts.mesh.says_rm = true;
     parts.mesh.grid = std::move(grid_);
     return parts;
   }
@@ -50,6 +59,14 @@ class ObjReader {
   tl::unexpected<Error> bad(const TextStatements& lines, const std::string& what) const {
     return bad_input(path_, fmt::format("corrupt OBJ file: line {}: {}", lines.line(), what));
   }
+
+  /// Then a place is a vertex; else it is one with each of its other numbers.
+  bool has_places_only() const { return uvs_.values.empty() && normals_.values.empty(); }
+
+  /// What was read of the file.
+  struct Before {
+    uint32_t vertices = 0, uvs = 0, normals = 0;
+  };
 
   Status read_vertices() {
     TextStatements lines(bytes_);
@@ -69,6 +86,15 @@ class ObjReader {
         }
         VOX_CHECK(uvs_.make_room(1, "texture coordinates", ctx_));
         uvs_.values.push_back(glm::vec2(uv[0], uv[1]));
+      } else if (keyword == "vn" && wants_normals_) {
+        glm::vec3 normal;
+        for (int c = 0; c < 3; ++c) {
+          const auto value = number_of(lines.word());
+          if (!value) return bad(lines, "vn: expected three numbers");
+          normal[c] = static_cast<float>(*value);
+        }
+        VOX_CHECK(normals_.make_room(1, "normals", ctx_));
+        normals_.values.push_back(normal);
       } else if (keyword == "mtllib") {
         VOX_CHECK(read_libraries(lines.rest()));
       } else if (keyword.empty() && !grid_) {
@@ -148,12 +174,13 @@ class ObjReader {
     for (const auto& [name, material] : library_.materials)
       emission_uvs |= material.maps.emission.used() && !(material.emission == material.color);
     const bool uvs = !uvs_.values.empty();
-    VOX_CHECK(builder_.add_attributes(
-        {.uvs = uvs, .emission_uvs = uvs && emission_uvs, .colors = !colors_.values.empty()}));
+    VOX_CHECK(builder_.add_attributes({.uvs = uvs,
+                                       .emission_uvs = uvs && emission_uvs,
+                                       .colors = !colors_.values.empty(),
+                                       .normals = !normals_.values.empty()}));
     VOX_CHECK(builder_.make_room(positions_.values.size(), 0, 0));
-    if (!uvs) {
-      for (uint32_t i = 0; i < positions_.values.size(); ++i)
-        VOX_CHECK(builder_.add_vertex(vertex_at({i, none})));
+    if (has_places_only()) {
+      for (uint32_t i = 0; i < positions_.values.size(); ++i) VOX_CHECK(builder_.add_vertex(vertex_at({i})));
     } else {
       VOX_CHECK(made_.make_room(positions_.values.size(), "the mesh", ctx_));
       made_.values.resize(positions_.values.size(), none);
@@ -164,20 +191,22 @@ class ObjReader {
 
   Status read_elements() {
     TextStatements lines(bytes_);
-    uint32_t vertices = 0, uvs = 0;  // up to here: negative numbers count back
+    Before before;  // up to here: negative numbers count back
     CountedList<uint32_t> corners;
     CountedList<Corner> read;
     while (lines.next()) {
       const std::string_view keyword = lines.word();
       if (keyword == "v") {
-        ++vertices;
+        ++before.vertices;
       } else if (keyword == "vt") {
-        ++uvs;
+        ++before.uvs;
+      } else if (keyword == "vn") {
+        ++before.normals;
       } else if (keyword == "f" || keyword == "fo" || keyword == "p") {
         read.values.clear();
         bool has_uvs = true;
         for (std::string_view word; !(word = lines.word()).empty();) {
-          VOX_TRY(const Corner corner, read_corner(lines, word, vertices, uvs));
+          VOX_TRY(const Corner corner, read_corner(lines, word, before));
           has_uvs &= corner.uv != none;
           VOX_CHECK(read.make_room(1, "a polygon", ctx_));
           read.values.push_back(corner);
@@ -213,13 +242,16 @@ class ObjReader {
 
   /// 1, 1/2, 1//3 or 1/2/3. Some programs write the second number where there are no texture coordinates at
   /// all: it is dropped.
-  Result<Corner> read_corner(const TextStatements& lines, std::string_view word, uint32_t vertices,
-                             uint32_t uvs) {
+  Result<Corner> read_corner(const TextStatements& lines, std::string_view word, const Before& counts) {
     const std::string_view all = word;
-    const auto index = [&](uint64_t before, uint64_t count, const char* what) -> Result<uint32_t> {
+    const auto take = [&] {
       const size_t end = std::min(word.find('/'), word.size());
-      std::string_view digits = word.substr(0, end);
+      const std::string_view digits = word.substr(0, end);
       word.remove_prefix(std::min(end + 1, word.size()));
+      return digits;
+    };
+    const auto index = [&](uint64_t before, uint64_t count, const char* what) -> Result<uint32_t> {
+      std::string_view digits = take();
       if (digits.empty()) return none;
       if (digits.starts_with('+')) digits.remove_prefix(1);
       int64_t number = 0;
@@ -236,11 +268,15 @@ class ObjReader {
                                                  : "there are none before it"));
     };
     Corner corner;
-    VOX_TRY(corner.vertex, index(vertices, positions_.values.size(), "vertex"));
+    VOX_TRY(corner.vertex, index(counts.vertices, positions_.values.size(), "vertex"));
     if (!uvs_.values.empty()) {
-      VOX_TRY(corner.uv, index(uvs, uvs_.values.size(), "texture coordinates"));
+      VOX_TRY(corner.uv, index(counts.uvs, uvs_.values.size(), "texture coordinates"));
     } else {
       lacks_uvs_ |= !word.empty() && word.front() != '/';
+      take();
+    }
+    if (!normals_.values.empty()) {
+      VOX_TRY(corner.normal, index(counts.normals, normals_.values.size(), "normal"));
     }
     if (corner.vertex == none) return bad(lines, fmt::format("{}: expected the number of a vertex", all));
     return corner;
@@ -269,6 +305,7 @@ class ObjReader {
     out.position = positions_.values[corner.vertex];
     if (!colors_.values.empty() && corner.vertex < colors_.values.size())
       out.color = colors_.values[corner.vertex];
+    if (corner.normal != none) out.normal = normals_.values[corner.normal];
     if (corner.uv == none) return out;
     const glm::vec2 uv = uvs_.values[corner.uv];
     const auto through = [&](const MapTransform& t) {
@@ -283,18 +320,18 @@ class ObjReader {
 
   /// The vertex of a corner: one that was made of the same numbers, among the last few of this place.
   Result<uint32_t> vertex_of(const Corner& corner) {
-    if (uvs_.values.empty()) return corner.vertex;
+    if (has_places_only()) return corner.vertex;
     const bool moves = now_ && (!(now_->color == MapTransform{}) || !(now_->emission == MapTransform{}));
     const uint32_t way = moves ? **material_ + 1 : 0;
     uint32_t at = made_.values[corner.vertex];
     for (int steps = 0; at != none && steps < 16; ++steps) {
       const Made& made = chain_.values[at];
-      if (made.uv == corner.uv && made.way == way) return at;
+      if (made.uv == corner.uv && made.normal == corner.normal && made.way == way) return at;
       at = made.before;
     }
     VOX_CHECK(chain_.make_room(1, "the mesh", ctx_));
     VOX_TRY(const uint32_t vertex, builder_.add_vertex(vertex_at(corner)));
-    chain_.values.push_back({corner.uv, way, made_.values[corner.vertex]});
+    chain_.values.push_back({corner.uv, corner.normal, way, made_.values[corner.vertex]});
     made_.values[corner.vertex] = vertex;
     return vertex;
   }
@@ -303,9 +340,11 @@ class ObjReader {
   const std::string& path_;
   MeshFolder& folder_;
   Context& ctx_;
+  bool wants_normals_;
   MeshBuilder builder_;
   CountedList<glm::dvec3> positions_;
   CountedList<glm::vec2> uvs_;
+  CountedList<glm::vec3> normals_;
   CountedList<glm::vec4> colors_;  ///< of the first vertices; the others are white
   MaterialLibrary library_;
   std::set<std::string> read_, dropped_, unknown_;
@@ -320,7 +359,7 @@ class ObjReader {
 
   /// What a vertex of the mesh was made of; the one before of the same place.
   struct Made {
-    uint32_t uv, way, before;
+    uint32_t uv, normal, way, before;
   };
   CountedList<uint32_t> made_;  ///< of places: the last vertex
   CountedList<Made> chain_;     ///< of vertices
@@ -328,9 +367,10 @@ class ObjReader {
 
 }  // namespace
 
-Result<MeshParts> read_obj(const std::string& path, MeshFolder& folder, Context& ctx) {
+Result<MeshParts> read_obj(const std::string& path, MeshFolder& folder, Context& ctx,
+                           const MeshOptions& options) {
   VOX_TRY(const auto file, MappedFile::open(path));
-  return ObjReader(file->bytes(), path, folder, ctx).read();
+  return ObjReader(file->bytes(), path, folder, ctx, options).read();
 }
 
 }  // namespace voxkit

@@ -29,15 +29,15 @@ struct PictureReference {
 struct MeshParts {
   Mesh mesh;
   struct Maps {
-    PictureReference color, opacity, emission;
+    PictureReference color, opacity, emission, rm;
     bool alpha_from_picture = false;  ///< a mask where the picture has alpha, as in .obj files
   };
   std::vector<Maps> maps;  ///< one a material
 };
 
 /// Checks that indices are in range and positions and picture coordinates finite where triangles use them,
-/// brings colours into 0..1, and drops triangles without area, and points that are nowhere. Errors:
-/// ErrorCode::input.
+/// brings colours into 0..1, makes normals that are not finite 0, and drops triangles without area, and
+/// points that are nowhere. Errors: ErrorCode::input.
 Status check_mesh(Mesh& mesh, const std::string& path);
 
 /// Reads the pictures of the materials that triangles and points use; each once. `path` is the mesh's, for

@@ -75,7 +75,7 @@ class PlyReader {
   Status read_vertices(const Element& element) {
     const bool colors = element.has(Role::red), uvs = element.has(Role::u) && element.has(Role::v);
     if (!element.has(Role::x) || !element.has(Role::y) || !element.has(Role::z)) return bad_vertices();
-    VOX_CHECK(builder_.add_attributes({.uvs = uvs, .colors = colors}));
+    VOX_CHECK(builder_.add_attributes({.uvs = uvs, .colors = colors, .normals = element.has(Role::nx)}));
     VOX_CHECK(builder_.make_room(element.count, 0, 0));
     for (uint64_t i = 0; i < element.count; ++i) {
       MeshVertex vertex;
@@ -94,6 +94,8 @@ class PlyReader {
           vertex.uv.x = static_cast<float>(value);
         else if (p.role == Role::v)
           vertex.uv.y = static_cast<float>(1 - value);
+        else if (p.role >= Role::nx && p.role <= Role::nz)
+          vertex.normal[static_cast<int>(p.role) - static_cast<int>(Role::nx)] = static_cast<float>(value);
       }
       VOX_CHECK(builder_.add_vertex(vertex));
     }
@@ -185,7 +187,11 @@ class PlyReader {
       VOX_CHECK(check_corner(corners[j]));
       auto number = static_cast<uint32_t>(corners[j]);
       if (uvs || color) {
-        MeshVertex vertex{builder_.position(number), builder_.uv(number), {}, builder_.color(number)};
+        MeshVertex vertex;
+        vertex.position = builder_.position(number);
+        vertex.uv = builder_.uv(number);
+        vertex.color = builder_.color(number);
+        vertex.normal = builder_.normal(number);
         if (uvs) vertex.uv = texcoords[j];
         if (color) vertex.color = *color;
         VOX_TRY(number, builder_.add_vertex(vertex));
@@ -222,10 +228,12 @@ class PlyReader {
 
 }  // namespace
 
-Result<MeshParts> read_ply(const std::string& path, Context& ctx) {
+Result<MeshParts> read_ply(const std::string& path, Context& ctx, const MeshOptions& options) {
   VOX_TRY(const auto file, MappedFile::open(path));
   const auto bytes = file->bytes();
-  VOX_TRY(const ply::Header header, ply::read_header(bytes, path));
+  VOX_TRY(ply::Header header, ply::read_header(bytes, path));
+  if (!options.normals) header.drop(Role::nx, Role::nz);
+  header.drop(Role::roughness, Role::intensity);
   return PlyReader(header, bytes, path, ctx).read();
 }
 

@@ -14,6 +14,6 @@ namespace voxkit {
 /// of two numbers a corner and a texnumber; `comment PictureFile` names the pictures. tristrips are strips of
 /// triangles, which -1 ends. Other elements and properties are passed over, with a note. Errors:
 /// ErrorCode::input, ErrorCode::limit.
-Result<MeshParts> read_ply(const std::string& path, Context& ctx);
+Result<MeshParts> read_ply(const std::string& path, Context& ctx, const MeshOptions& options = {});
 
 }  // namespace voxkit

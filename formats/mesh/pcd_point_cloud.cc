@@ -31,8 +31,9 @@ class PcdPointCloud final : public PointCloud {
  public:
   /// `data`: what is behind the header, unpacked.
   PcdPointCloud(std::shared_ptr<const MappedFile> file, std::string path, Header header,
-                std::span<const std::byte> data)
+                std::span<const std::byte> data, const PointExtras& wanted)
       : file_(std::move(file)), path_(std::move(path)), header_(std::move(header)), data_(data) {
+    least_alpha_ = wanted.alpha ? 1 : 128;
     size_ = header_.points;
     notes_ = header_.notes;
     columns_ = header_.data == Data::compressed;
@@ -43,6 +44,7 @@ class PcdPointCloud final : public PointCloud {
     const Roles& roles = header_.roles;
     const bool is_float_text =
         header_.data == Data::ascii && roles.color >= 0 && field(roles.color).type == 'F';
+    has_.alpha = roles.has_alpha;
     if (!roles.has_alpha && roles.intensity < 0 && !is_float_text) return {};
     uint64_t lost = 0;
     uint32_t alphas = 0;
@@ -59,7 +61,7 @@ class PcdPointCloud final : public PointCloud {
     if (lost > 0)
       notes_.push_back(fmt::format("{} points have a color that is no number: they are white", lost));
     if (roles.has_alpha && alphas == 0) {
-      header_.roles.has_alpha = false;
+      header_.roles.has_alpha = has_.alpha = false;
       notes_.emplace_back("alpha is 0 everywhere: it is not counted");
     }
     if (roles.intensity >= 0 && greatest > least) {
@@ -109,7 +111,7 @@ class PcdPointCloud final : public PointCloud {
           use(raw_at([&](const Field& f) { return data_.data() + i * header_.bytes + f.bytes; }), point);
           return true;
         },
-        [&](uint64_t i) { before.release(i * header_.bytes); });
+        [&](uint64_t i) { before.release(i * header_.bytes); }, least_alpha_);
   }
 
   /// Of compressed files: all numbers of a field before those of the next.
@@ -128,7 +130,8 @@ class PcdPointCloud final : public PointCloud {
         [&](uint64_t i) {
           for (size_t f = 0; f < before.size(); ++f)
             before[f].release(i * header_.fields[f].count * header_.fields[f].size);
-        });
+        },
+        least_alpha_);
   }
 
   template <class At>
@@ -199,7 +202,8 @@ class PcdPointCloud final : public PointCloud {
       }
       return true;
     };
-    return read_in_runs(size_, blank, sink, next, [&](uint64_t) { before.release(at); });
+    return read_in_runs(
+        size_, blank, sink, next, [&](uint64_t) { before.release(at); }, least_alpha_);
   }
 
   std::shared_ptr<const MappedFile> file_;
@@ -207,6 +211,7 @@ class PcdPointCloud final : public PointCloud {
   Header header_;
   std::span<const std::byte> data_;
   bool columns_ = false;
+  uint8_t least_alpha_ = 128;
   double least_ = 0, range_ = 0;  ///< of intensities
 };
 
@@ -232,7 +237,8 @@ Result<std::shared_ptr<const MappedFile>> unpack(const MappedFile& file, const H
 
 }  // namespace
 
-Result<std::unique_ptr<const PointCloud>> open_pcd_points(const std::string& path) {
+Result<std::unique_ptr<const PointCloud>> open_pcd_points(const std::string& path,
+                                                          const PointExtras& wanted) {
   VOX_TRY(auto file, MappedFile::open(path));
   VOX_TRY(Header header, read_header(file->bytes(), path));
   if (header.points == 0) return bad_input(path, "no points");
@@ -246,7 +252,7 @@ Result<std::unique_ptr<const PointCloud>> open_pcd_points(const std::string& pat
   if (data.size() + (header.data == Data::ascii) < least)
     return bad_input(path, fmt::format("PCD file ends after {} bytes: expected {} points",
                                        file->bytes().size(), header.points));
-  auto points = std::make_unique<PcdPointCloud>(std::move(file), path, std::move(header), data);
+  auto points = std::make_unique<PcdPointCloud>(std::move(file), path, std::move(header), data, wanted);
   VOX_CHECK(points->look_through());
   return points;
 }

@@ -45,7 +45,25 @@ Role role_of(std::string_view element, std::string_view property, bool list) {
                                                                {"diffuse_red", red},
                                                                {"diffuse_green", green},
                                                                {"diffuse_blue", blue},
-                                                               {"diffuse_alpha", alpha}};
+                                                               {"diffuse_alpha", alpha},
+                                                               {"nx", nx},
+                                                               {"ny", ny},
+                                                               {"nz", nz},
+                                                               {"normal_x", nx},
+                                                               {"normal_y", ny},
+                                                               {"normal_z", nz},
+                                                               {"roughness", roughness},
+                                                               {"metallic", metalness},
+                                                               {"metalness", metalness},
+                                                               {"metallicness", metalness},
+                                                               {"label", label},
+                                                               {"class", label},
+                                                               {"classification", label},
+                                                               {"scalar_Label", label},
+                                                               {"scalar_Classification", label},
+                                                               {"intensity", intensity},
+                                                               {"scalar_Intensity", intensity},
+                                                               {"scalar_intensity", intensity}};
   constexpr std::pair<std::string_view, Role> of_faces[] = {
       {"vertex_indices", corners}, {"vertex_index", corners}, {"texcoord", texcoords}};
   const bool strips = element == "tristrips";
@@ -159,18 +177,31 @@ Result<Header> read_header(std::span<const std::byte> bytes, const std::string& 
         return broken("expected the type of a property");
       property.type = *type;
       property.count_type = *count_type;
-      property.role = role_of(header.elements.back().name, words.back(), property.list);
-      header.elements.back().properties.push_back(property);
-      if (property.role == Role::none)
-        header.dropped.push_back(fmt::format("{} of {}", words.back(), header.elements.back().name));
+      property.name = words.back();
+      Element& element = header.elements.back();
+      property.role = role_of(element.name, words.back(), property.list);
+      // Of several labels the first one counts.
+      if (property.role == Role::label && element.has(Role::label)) property.role = Role::none;
+      element.properties.push_back(std::move(property));
     } else {
       return broken("expected format, comment, element, property or end_header");
     }
   }
 }
 
+void Header::drop(Role first, Role last) {
+  for (Element& element : elements)
+    for (Property& property : element.properties)
+      if (property.role >= first && property.role <= last) property.role = Role::none;
+}
+
 std::vector<std::string> Header::notes() const {
   constexpr size_t most = 16;
+  std::vector<std::string> dropped;
+  for (const Element& element : elements)
+    for (const Property& property : element.properties)
+      if (property.role == Role::none)
+        dropped.push_back(fmt::format("{} of {}", property.name, element.name));
   if (dropped.empty()) return {};
   const std::span<const std::string> first(dropped.data(), std::min(dropped.size(), most));
   return {fmt::format("dropped: {}{}", fmt::join(first, ", "),

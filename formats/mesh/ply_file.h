@@ -20,10 +20,33 @@ double load(const std::byte* bytes, Type type, bool big_endian);
 /// Of colours: what makes them 0 to 1. Whole numbers of more than 16 bits have those of 8.
 double scale_of(Type type);
 
-/// What of a mesh a property is.
-enum class Role : uint8_t { none, x, y, z, red, green, blue, alpha, u, v, corners, texcoords, picture };
+/// What of a mesh or of points a property is.
+enum class Role : uint8_t {
+  none,
+  x,
+  y,
+  z,
+  red,
+  green,
+  blue,
+  alpha,
+  u,
+  v,
+  corners,
+  texcoords,
+  picture,
+  // Those below may be left out by Header::drop.
+  nx,
+  ny,
+  nz,
+  roughness,
+  metalness,
+  label,
+  intensity
+};
 
 struct Property {
+  std::string name;
   Type type = Type::f32, count_type = Type::u8;
   bool list = false;
   Role role = Role::none;
@@ -42,9 +65,10 @@ struct Header {
   bool ascii = false, big_endian = false;
   std::vector<Element> elements;
   std::vector<std::string> pictures;
-  std::vector<std::string> dropped;  ///< elements and properties that are no part of a mesh
-  size_t end = 0;                    ///< where the data begins
-  /// What is dropped, in a sentence; nothing where nothing is.
+  size_t end = 0;  ///< where the data begins
+  /// Leaves out properties of these roles.
+  void drop(Role first, Role last);
+  /// What is dropped, properties that have no role, in a sentence; nothing where nothing is.
   std::vector<std::string> notes() const;
 };
 

@@ -19,6 +19,15 @@ struct CloudPoint {
   glm::dvec3 at{0};
   std::array<uint8_t, 3> color{};
   uint8_t alpha = 255;
+  // What is wanted beside that, where the file has it:
+  glm::vec3 normal{0};                     ///< of any length; 0: it has none
+  uint8_t roughness = 255, metalness = 0;  ///< 0..255 for 0..1
+  uint32_t label = 0;                      ///< a class, or another number
+};
+
+/// What points may have beside places and colours.
+struct PointExtras {
+  bool alpha = false, normals = false, rm = false, labels = false;
 };
 
 class PointCloud {
@@ -29,27 +38,37 @@ class PointCloud {
   /// What of the file is left out, a sentence each.
   const std::vector<std::string>& notes() const { return notes_; }
 
+  /// What the file has, wanted or not.
+  const PointExtras& has() const { return has_; }
+
   using Sink = std::function<Status(std::span<const CloudPoint>)>;
   /// Calls `sink` with the points, in runs, in their order: all but those with a coordinate that is not
-  /// finite or an alpha below a half. ErrorCode::input where the file is damaged; `sink`'s errors.
+  /// finite, or an alpha below a half; or of 0, where alpha is wanted. ErrorCode::input where the file is
+  /// damaged; `sink`'s errors.
   virtual Status read(const Sink& sink) const = 0;
 
  protected:
   uint64_t size_ = 0;
+  PointExtras has_;
   std::vector<std::string> notes_;
 };
 
 /// Whether a name ends like points: .ply (which may be a mesh, too), .pcd, .las or .laz.
 bool is_points_name(const std::string& name);
 
-/// Opens the points of a file by its ending. Null of a .ply file with faces, which is a mesh. Errors: those
+/// Opens the points of a file by its ending. What is not wanted, or not there, is as in a CloudPoint that
+/// nothing was said of, and named as dropped. Null of a .ply file with faces, which is a mesh. Errors: those
 /// of the functions below.
-Result<std::unique_ptr<const PointCloud>> open_points(const std::string& path);
+Result<std::unique_ptr<const PointCloud>> open_points(const std::string& path,
+                                                      const PointExtras& wanted = {});
 
-/// The points of a .ply file: its vertices, which have x, y and z, and red, green and blue or no colours:
-/// then they are white. Null of a file with faces, which is a mesh. ErrorCode::input: no such file, or it is
-/// damaged as far as its header says.
-Result<std::unique_ptr<const PointCloud>> open_ply_points(const std::string& path);
+/// The points of a .ply file: its vertices, which have x, y and z, and red, green and blue; without
+/// them intensity is grey, from 0, or the least where that is below, to the greatest; else they are white.
+/// Normals are nx, ny and nz; labels are label, class or classification, or a scalar_ of those, where
+/// what is below 0 counts back from 2^32. Null of a file with faces, which is a mesh. ErrorCode::input: no
+/// such file, or it is damaged as far as its header says.
+Result<std::unique_ptr<const PointCloud>> open_ply_points(const std::string& path,
+                                                          const PointExtras& wanted = {});
 
 /// The points of a .pcd file of the Point Cloud Library, version 0.7 or older ("The PCD file format"): ASCII,
 /// binary and binary_compressed, which is unpacked into a file in $TMPDIR (default /tmp). Places are x, y and
@@ -57,13 +76,15 @@ Result<std::unique_ptr<const PointCloud>> open_ply_points(const std::string& pat
 /// its alpha, unless that is 0 everywhere; without either, intensity is grey, from 0, or the least where that
 /// is below, to the greatest; else points are white. ErrorCode::input: no such file, or it is damaged as far
 /// as its header says; ErrorCode::output: no room to unpack it.
-Result<std::unique_ptr<const PointCloud>> open_pcd_points(const std::string& path);
+Result<std::unique_ptr<const PointCloud>> open_pcd_points(const std::string& path,
+                                                          const PointExtras& wanted = {});
 
 /// The points of a .las file, version 1.0 to 1.4 (ASPRS, "LAS specification 1.4-R15"), of any format, not
 /// compressed. Places are scaled and shifted in doubles, in the file's coordinate reference system. Of
 /// colours of 16 bits the upper 8 count; where none is above 255 they are of 8. Where there are none, or all
-/// are 0, intensity is grey, from 0 to the greatest. Points that are withheld are left out. ErrorCode::input:
-/// no such file, it is compressed (LAZ), or it is damaged.
-Result<std::unique_ptr<const PointCloud>> open_las_points(const std::string& path);
+/// are 0, intensity is grey, from 0 to the greatest. Labels are classes. Points that are withheld are left
+/// out. ErrorCode::input: no such file, it is compressed (LAZ), or it is damaged.
+Result<std::unique_ptr<const PointCloud>> open_las_points(const std::string& path,
+                                                          const PointExtras& wanted = {});
 
 }  // namespace voxkit

@@ -29,17 +29,17 @@ class ReadBytes {
 
 /// Calls `sink` with `count` points of a file in runs, without those that PointCloud::read leaves out.
 /// `next(i, point)` makes point i of `blank`, and says whether the file counts it; `done(i)` is called after
-/// a run that ends before point i.
+/// a run that ends before point i. Points below `least_alpha` are left out.
 template <class Next, class Done>
 Status read_in_runs(uint64_t count, const CloudPoint& blank, const PointCloud::Sink& sink, const Next& next,
-                    const Done& done) {
+                    const Done& done, uint8_t least_alpha = 128) {
   constexpr uint64_t most = 1 << 14;
   std::vector<CloudPoint> run;
   run.reserve(most);
   for (uint64_t i = 0; i < count; ++i) {
     CloudPoint& point = run.emplace_back(blank);
     VOX_TRY(bool there, next(i, point));
-    there &= point.alpha >= 128;
+    there &= point.alpha >= least_alpha;
     for (int a = 0; a < 3; ++a)
       if (constexpr double large = 3.5e38; !(std::abs(point.at[a]) <= large)) there = false;
     if (!there) run.pop_back();

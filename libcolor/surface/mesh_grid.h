@@ -2,6 +2,7 @@
 #pragma once
 
 #include <glm/mat3x3.hpp>
+#include <glm/matrix.hpp>
 #include <optional>
 
 #include "formats/mesh/mesh.h"
@@ -25,6 +26,8 @@ class MeshGrid {
 
   /// Extents, place, world.
   const VolumeInfo& info() const { return info_; }
+  /// What takes normals to the axes of voxels, but for their length.
+  glm::dmat3 normal_axes() const { return glm::transpose(glm::inverse(scale_)); }
   /// A triangle whose corners are vertices of the mesh; all three may be one.
   SnappedTriangle snap(const Mesh& mesh, const MeshTriangle& triangle) const;
 

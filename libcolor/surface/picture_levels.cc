@@ -106,7 +106,7 @@ Result<PictureLevels::Level> PictureLevels::halved(const Level& from, Context& c
   return to;
 }
 
-Result<PictureLevels> PictureLevels::make(const Picture& picture, bool opaque, Context& ctx) {
+Result<PictureLevels> PictureLevels::make(const Picture& picture, Kind kind, Context& ctx, int cut_off) {
   PictureLevels out;
   VOX_TRY(Level first, Level::make(picture.width, picture.height, ctx));
   const auto& linear = light_tables().linear;
@@ -114,8 +114,12 @@ Result<PictureLevels> PictureLevels::make(const Picture& picture, bool opaque, C
   for (int64_t y = 0; y < picture.height; ++y)
     for (int64_t x = 0; x < picture.width; ++x, from += 4) {
       uint16_t* to = first.at(x, y);
-      const uint32_t alpha = opaque ? 255 : from[3];
-      for (size_t c = 0; c < 3; ++c) to[c] = static_cast<uint16_t>((linear[from[c]] * alpha + 127) / 255);
+      const uint32_t alpha = kind == Kind::color  ? from[3]
+                             : kind == Kind::mask ? (from[3] >= cut_off ? 255 : 0)
+                                                  : 255;
+      for (size_t c = 0; c < 3; ++c)
+        to[c] = kind == Kind::numbers ? static_cast<uint16_t>(from[c] * 257)
+                                      : static_cast<uint16_t>((linear[from[c]] * alpha + 127) / 255);
       to[3] = static_cast<uint16_t>(alpha * 257);
     }
   out.levels_.push_back(std::move(first));

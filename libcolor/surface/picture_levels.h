@@ -17,8 +17,11 @@ using Float4 = float __attribute__((vector_size(16)));
 /// texels cover. Colours are multiplied by alpha, so that what is not there gives no colour to what is.
 class PictureLevels {
  public:
-  /// `opaque`: alpha counts as 1 everywhere. The memory counts against ctx.memory.
-  static Result<PictureLevels> make(const Picture& picture, bool opaque, Context& ctx);
+  /// What texels are. Of a mask those whose alpha is at least 1 to 255 `cut_off` are there, and no other.
+  enum class Kind : uint8_t { color, opaque, mask, numbers };
+  /// Of opaque pictures and numbers alpha counts as 1 everywhere; numbers are no light, and 0..65535 for
+  /// 0..255. The memory counts against ctx.memory.
+  static Result<PictureLevels> make(const Picture& picture, Kind kind, Context& ctx, int cut_off = 128);
 
   int64_t width() const { return levels_[0].width; }
   int64_t height() const { return levels_[0].height; }

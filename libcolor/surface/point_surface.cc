@@ -10,22 +10,24 @@
 
 #include "formats/mapped_file.h"
 #include "formats/reservation.h"
+#include "libcolor/surface/attribute_choice.h"
 #include "libcolor/surface/morton.h"
+#include "libcolor/surface/point_means.h"
 #include "libcolor/surface/voxel_means.h"
 
 namespace voxkit::color {
 namespace {
 
-/// Points in the grid, a voxel each.
-using Part = std::span<const SurfaceVoxel>;
-
-bool by_place(const SurfaceVoxel& a, const SurfaceVoxel& b) {
+template <class Point>
+bool by_place(const Point& a, const Point& b) {
   return a.place < b.place;
 }
 
-/// Sorted parts, one after the other, in an unlinked file.
+/// Sorted parts, one after the other, in an unlinked file. Points are in the grid, a place each.
+template <class Point>
 class PartFile {
  public:
+  using Part = std::span<const Point>;
   Status add(Part part) {
     VOX_CHECK(writer_.write(std::as_bytes(part)));
     sizes_.push_back(part.size());
@@ -33,12 +35,13 @@ class PartFile {
   }
   bool empty() const { return sizes_.empty(); }
   /// All of them, sorted.
-  Status merge(VoxelMeans& means) {
+  template <class Means>
+  Status merge(Means& means) {
     VOX_TRY(const auto file, writer_.map());
-    const auto* at = reinterpret_cast<const SurfaceVoxel*>(file->bytes().data());
+    const auto* at = reinterpret_cast<const Point*>(file->bytes().data());
     struct Rest {
       Part part;
-      const SurfaceVoxel* released;  ///< what is before has left this process
+      const Point* released;  ///< what is before has left this process
     };
     const auto later = [](const Rest& a, const Rest& b) {
       return a.part.front().place > b.part.front().place;
@@ -75,39 +78,58 @@ class PartFile {
 class PointSurface final : public SurfaceSource {
  public:
   PointSurface(std::unique_ptr<const PointCloud> points, VolumeInfo info, const glm::dvec3& lo,
-               std::vector<std::string> notes)
+               std::vector<std::string> notes, AttributeSet attributes)
       : points_(std::move(points)), lo_(lo), edge_(info.affine.axes[0][0]) {
     info_ = std::move(info);
     notes_ = std::move(notes);
+    attributes_ = attributes;
     info_.format = VoxelFormat::rgba32;
   }
 
   Status read(Context& ctx, const Sink& sink) override {
-    const uint64_t most = std::clamp<uint64_t>(ctx.memory->limit() / 4 / sizeof(SurfaceVoxel), 1 << 14,
+    if (attributes_.empty()) {
+      VoxelMeans means(sink);
+      return read_points<SurfaceVoxel>(
+          [](uint64_t place, const CloudPoint& point) -> SurfaceVoxel {
+            return {place, {point.color[0], point.color[1], point.color[2]}};
+          },
+          means, ctx);
+    }
+    PointMeans means(sink, attributes_);
+    const bool opacity = attributes_.has(Attribute::opacity);
+    return read_points<AttributedPoint>(
+        [&](uint64_t place, const CloudPoint& point) { return AttributedPoint(place, point, opacity); },
+        means, ctx);
+  }
+
+ private:
+  /// `make(place, point)` makes what is sorted.
+  template <class Point, class Make, class Means>
+  Status read_points(const Make& make, Means& means, Context& ctx) {
+    const uint64_t most = std::clamp<uint64_t>(ctx.memory->limit() / 4 / sizeof(Point), 1 << 14,
                                                std::max<uint64_t>(points_->size(), 1 << 14));
     VOX_TRY(const Reservation memory,
-            Reservation::take(std::min(most, points_->size()) * sizeof(SurfaceVoxel), "points, sorted", ctx));
-    std::vector<SurfaceVoxel> part;
+            Reservation::take(std::min(most, points_->size()) * sizeof(Point), "points, sorted", ctx));
+    std::vector<Point> part;
     part.reserve(std::min(most, points_->size()));
-    PartFile parts;
+    PartFile<Point> parts;
     uint64_t read = 0;
     VOX_CHECK(points_->read([&](std::span<const CloudPoint> run) -> Status {
       for (const CloudPoint& point : run) {
         if (part.size() == most) {
-          std::sort(part.begin(), part.end(), by_place);
+          std::sort(part.begin(), part.end(), by_place<Point>);
           VOX_CHECK(parts.add(part));
           part.clear();
         }
-        part.push_back({place_of(point), {point.color[0], point.color[1], point.color[2]}});
+        part.push_back(make(place_of(point), point));
       }
       read += run.size();
       ctx.progress(static_cast<double>(read) / static_cast<double>(points_->size()));
       return {};
     }));
-    std::sort(part.begin(), part.end(), by_place);
-    VoxelMeans means(sink);
+    std::sort(part.begin(), part.end(), by_place<Point>);
     if (parts.empty()) {
-      for (const SurfaceVoxel& point : part) VOX_CHECK(means.add(point));
+      for (const Point& point : part) VOX_CHECK(means.add(point));
     } else {
       VOX_CHECK(parts.add(part));
       VOX_CHECK(parts.merge(means));
@@ -115,7 +137,6 @@ class PointSurface final : public SurfaceSource {
     return means.finish();
   }
 
- private:
   uint64_t place_of(const CloudPoint& point) const {
     uint32_t at[3];
     for (int a = 0; a < 3; ++a)
@@ -132,22 +153,34 @@ class PointSurface final : public SurfaceSource {
 }  // namespace
 
 Result<std::unique_ptr<SurfaceSource>> surface_of_points(std::unique_ptr<const PointCloud> points,
-                                                         int64_t resolution, Context&) {
+                                                         int64_t resolution, Context&,
+                                                         const std::optional<AttributeSet>& wanted) {
   if (resolution < 1 || resolution > int64_t{1} << most_levels)
     return bad_usage(
         fmt::format("a resolution of {}: expected 1 to {}", resolution, int64_t{1} << most_levels));
   glm::dvec3 lo(INFINITY), hi(-INFINITY);
   uint64_t seen = 0;
+  bool faint = false;
   VOX_CHECK(points->read([&](std::span<const CloudPoint> run) -> Status {
     seen += run.size();
-    for (const CloudPoint& point : run)
+    for (const CloudPoint& point : run) {
+      faint |= point.alpha != 255;
       for (int a = 0; a < 3; ++a) {
         lo[a] = std::min(lo[a], point.at[a]);
         hi[a] = std::max(hi[a], point.at[a]);
       }
+    }
     return {};
   }));
   if (seen == 0) return bad_input({}, "no points that are at finite coordinates and at least half opaque");
+  const PointExtras& has = points->has();
+  AttributeSet can, by_itself;
+  add_if(can, Attribute::opacity, has.alpha);
+  add_if(can, Attribute::normal, has.normals);
+  add_if(can, Attribute::rm, has.rm);
+  add_if(can, Attribute::id, has.labels);
+  add_if(by_itself, Attribute::opacity, has.alpha && faint);
+  VOX_TRY(const AttributeSet attributes, choose_attributes(wanted, can, by_itself));
   std::vector<std::string> notes = points->notes();
   if (seen < points->size())
     notes.push_back(
@@ -164,7 +197,7 @@ Result<std::unique_ptr<SurfaceSource>> surface_of_points(std::unique_ptr<const P
     info.affine.axes[axis][axis] = edge;
     info.affine.origin[axis] = lo[a] + edge / 2;
   }
-  return std::make_unique<PointSurface>(std::move(points), std::move(info), lo, std::move(notes));
+  return std::make_unique<PointSurface>(std::move(points), std::move(info), lo, std::move(notes), attributes);
 }
 
 }  // namespace voxkit::color

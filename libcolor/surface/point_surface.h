@@ -2,6 +2,7 @@
 #pragma once
 
 #include <memory>
+#include <optional>
 
 #include "formats/mesh/point_cloud.h"
 #include "libcolor/surface/surface.h"
@@ -13,7 +14,12 @@ namespace voxkit::color {
 /// voxels. What does not fit into a quarter of the memory limit is sorted in parts, 16 bytes a point, which
 /// go through a file in $TMPDIR (default /tmp). ErrorCode::usage for the resolution, ErrorCode::input where
 /// no point counts; those of the points.
+///
+/// `attributes`: what voxels have beside colours (point_means.h), of what the points have and were opened
+/// with (PointExtras); not said: opacity where some point is neither opaque nor clear. ErrorCode::usage for
+/// what they do not have.
 Result<std::unique_ptr<SurfaceSource>> surface_of_points(std::unique_ptr<const PointCloud> points,
-                                                         int64_t resolution, Context& ctx);
+                                                         int64_t resolution, Context& ctx,
+                                                         const std::optional<AttributeSet>& attributes = {});
 
 }  // namespace voxkit::color

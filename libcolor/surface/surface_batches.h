@@ -12,19 +12,30 @@
 
 namespace voxkit::color {
 
+/// Voxels as they are made, and their attributes.
+struct VoxelBatch {
+  std::vector<SurfaceVoxel> voxels;
+  std::vector<std::byte> attributes;
+  void clear() {
+    voxels.clear();
+    attributes.clear();
+  }
+};
+
 struct BatchSizes {
-  int cube_bits = 0;          ///< a cube has 2^cube_bits voxels a side
-  int all_bits = 0;           ///< and so has everything
-  uint64_t thread_bytes = 0;  ///< what a thread works with
+  int cube_bits = 0;           ///< a cube has 2^cube_bits voxels a side
+  int all_bits = 0;            ///< and so has everything
+  uint64_t thread_bytes = 0;   ///< what a thread works with
+  size_t attribute_bytes = 0;  ///< of a voxel
 };
 
 /// Calls `next(job)`, which tells whether there was another, for the cubes in Morton order, and
-/// `make(job, voxels)`, from ctx.threads threads, which appends the voxels of a cube in Morton order. A batch
+/// `make(job, batch)`, from ctx.threads threads, which appends the voxels of a cube in Morton order. A batch
 /// of cubes is made while the one before is handed to `sink`. Batches are as large as ctx.memory has room.
 template <class Job, class Next, class Make>
 Status read_in_batches(const BatchSizes& sizes, const SurfaceSource::Sink& sink, Context& ctx,
                        const Next& next, const Make& make) {
-  const uint64_t cube_bytes = sizeof(SurfaceVoxel) << (3 * sizes.cube_bits);
+  const uint64_t cube_bytes = (sizeof(SurfaceVoxel) + sizes.attribute_bytes) << (3 * sizes.cube_bits);
   const auto threads = static_cast<uint64_t>(ctx.threads);
   uint64_t batch = std::clamp(ctx.memory->limit() / 8 / cube_bytes, uint64_t{1}, 32 * threads);
   Result<Reservation> hold;
@@ -35,13 +46,13 @@ Status read_in_batches(const BatchSizes& sizes, const SurfaceSource::Sink& sink,
   if (!hold) return tl::unexpected<Error>(hold.error());
 
   std::vector<Job> jobs;
-  std::vector<std::vector<SurfaceVoxel>> ready, made;
+  std::vector<VoxelBatch> ready, made;
   uint64_t last_place = 0;
   const auto hand_over = [&]() -> Status {
-    for (const auto& voxels : ready)
-      if (!voxels.empty()) {
-        VOX_CHECK(sink(voxels));
-        last_place = voxels.back().place;
+    for (const VoxelBatch& cube : ready)
+      if (!cube.voxels.empty()) {
+        VOX_CHECK(sink({cube.voxels, cube.attributes}));
+        last_place = cube.voxels.back().place;
       }
     return {};
   };
@@ -54,7 +65,7 @@ Status read_in_batches(const BatchSizes& sizes, const SurfaceSource::Sink& sink,
     }
     // Those of two batches ago keep their memory.
     made.resize(jobs.size());
-    for (auto& voxels : made) voxels.clear();
+    for (VoxelBatch& cube : made) cube.clear();
     VOX_CHECK(parallel_for(ctx, static_cast<int64_t>(jobs.size()) + 1, [&](int64_t i) -> Status {
       if (i == 0) return hand_over();
       return make(jobs[static_cast<size_t>(i - 1)], made[static_cast<size_t>(i - 1)]);

@@ -3,10 +3,13 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <map>
 #include <mutex>
+#include <tuple>
 #include <utility>
 
 #include "formats/reservation.h"
+#include "libcolor/surface/attribute_choice.h"
 #include "libcolor/surface/mesh_grid.h"
 #include "libcolor/surface/surface_batches.h"
 #include "libcolor/surface/voxelise_tile.h"
@@ -82,6 +85,7 @@ class MeshSurface : public SurfaceSource {
     info_ = info;
     notes_ = std::move(remarks.notes);
     emits_ = remarks.emits;
+    attributes_ = scene_.attributes;
     const int64_t side = std::max({info.dims.x, info.dims.y, info.dims.z});
     while (int64_t{1} << all_.bits < side) ++all_.bits;
     tile_bits_ = std::min(tile_bits, all_.bits);
@@ -90,13 +94,13 @@ class MeshSurface : public SurfaceSource {
   Status read(Context& ctx, const Sink& sink) override {
     Parts parts(scene_, all_, tile_bits_);
     return read_in_batches<Part>(
-        {tile_bits_, all_.bits, TileWork::bytes(tile_bits_)}, sink, ctx,
-        [&](Part& part) { return parts.next(part, ctx); },
-        [&](const Part& part, auto& out) { return make(part, out); });
+        {tile_bits_, all_.bits, TileWork::bytes(tile_bits_, !attributes_.empty()), attributes_.bytes()}, sink,
+        ctx, [&](Part& part) { return parts.next(part, ctx); },
+        [&](const Part& part, VoxelBatch& out) { return make(part, out); });
   }
 
  private:
-  Status make(const Part& part, std::vector<SurfaceVoxel>& out) {
+  Status make(const Part& part, VoxelBatch& out) {
     std::unique_ptr<TileWork> work;
     {
       std::lock_guard lock(mutex_);
@@ -117,30 +121,58 @@ class MeshSurface : public SurfaceSource {
   std::vector<std::unique_ptr<TileWork>> idle_;
 };
 
-/// What is not kept of opacity and emission.
-Remarks remarks_of(const Mesh& mesh, bool emission) {
-  Remarks out;
+bool has_faint_corners(const Mesh& mesh) {
+  return std::any_of(mesh.colors.begin(), mesh.colors.end(),
+                     [](const glm::vec4& color) { return color.a < 1; });
+}
+
+/// The numbers of materials, and their names.
+std::string legend_of(const std::map<uint32_t, std::string>& names) {
+  constexpr size_t most = 32;
+  std::string out = "materials:";
+  size_t count = 0;
+  for (const auto& [number, name] : names) {
+    if (count++ == most) break;
+    out += fmt::format("{} {} = {}", count > 1 ? "," : "", number, name.empty() ? "(no name)" : name);
+  }
+  return names.size() > most ? out + fmt::format(" and {} others", names.size() - most) : out;
+}
+
+/// What is delivered beside colours; and what is not kept of opacity and emission.
+Result<AttributeSet> choose(const Mesh& mesh, const VoxeliseOptions& options, Remarks& out) {
   out.notes = mesh.notes;
   std::vector<bool> used(mesh.materials.size());
   for (const MeshTriangle& triangle : mesh.triangles) used[triangle.material] = true;
   for (const MeshPoint& point : mesh.points) used[point.material] = true;
-  const bool faint_corners =
-      std::any_of(mesh.colors.begin(), mesh.colors.end(), [](const glm::vec4& color) { return color.a < 1; });
+  const bool faint_corners = has_faint_corners(mesh);
   int blended = 0, emitting = 0;
+  std::map<uint32_t, std::string> names;
   for (size_t i = 0; i < used.size(); ++i) {
     const MeshMaterial& m = mesh.materials[i];
     if (!used[i]) continue;
+    names.try_emplace(m.number, m.name);
     emitting += m.emits();
     if (m.alpha_mode == AlphaMode::blend)
       blended += m.color.a < 1 || faint_corners ||
                  (m.picture >= 0 && mesh.pictures[static_cast<size_t>(m.picture)].has_alpha);
   }
-  if (blended)
+  out.emits = emitting && options.emission;
+  AttributeSet can, by_itself;
+  for (const Attribute a : {Attribute::opacity, Attribute::normal, Attribute::id}) can.add(a);
+  add_if(can, Attribute::emissive, options.emission && (emitting || mesh.says_emission));
+  add_if(can, Attribute::rm, mesh.says_rm);
+  add_if(by_itself, Attribute::emissive, out.emits);
+  add_if(by_itself, Attribute::opacity, blended > 0);
+  if (options.attributes && options.attributes->has(Attribute::emissive) && !options.emission)
+    return bad_usage("attributes: emissive: emission is dropped: expected it to be added");
+  VOX_TRY(const AttributeSet attributes, choose_attributes(options.attributes, can, by_itself));
+  if (attributes.has(Attribute::id)) out.notes.push_back(legend_of(names));
+  if (blended && !attributes.has(Attribute::opacity))
     out.notes.push_back(fmt::format(
         "opacity becomes yes or no: of {} blended materials there is what is at least half opaque", blended));
-  if (emitting && !emission) out.notes.push_back(fmt::format("dropped: emission of {} materials", emitting));
-  out.emits = emitting && emission;
-  return out;
+  if (emitting && !options.emission)
+    out.notes.push_back(fmt::format("dropped: emission of {} materials", emitting));
+  return attributes;
 }
 
 /// The mesh's own grid, where it has one and no other is asked for.
@@ -168,7 +200,8 @@ Result<std::unique_ptr<SurfaceSource>> make_surface(Mesh mesh, const VoxeliseOpt
         fmt::format("a resolution of {}: expected 1 to {}", *options.resolution, int64_t{1} << most_levels));
   const uint64_t parts = uint64_t{mesh.triangles.size()} + mesh.points.size();
   if (parts == 0 || parts > UINT32_MAX) return bad_input({}, "a mesh without triangles, or of 2^32 or more");
-  Remarks remarks = remarks_of(mesh, options.emission);
+  Remarks remarks;
+  VOX_TRY(const AttributeSet attributes, choose(mesh, options, remarks));
   const MeshGrid grid = grid_of(mesh, options, remarks);
   const Index3 dims = grid.info().dims;
   if (!checked_voxels(dims))
@@ -182,6 +215,8 @@ Result<std::unique_ptr<SurfaceSource>> make_surface(Mesh mesh, const VoxeliseOpt
                             "voxelising", ctx));
   VoxelScene scene;
   scene.kind = options.kind;
+  scene.attributes = attributes;
+  scene.normal_axes = grid.normal_axes();
   scene.first_point = mesh.triangles.size();
   mesh.triangles.reserve(parts);
   for (const auto& [vertex, material] : mesh.points)
@@ -189,31 +224,47 @@ Result<std::unique_ptr<SurfaceSource>> make_surface(Mesh mesh, const VoxeliseOpt
   scene.corners.reserve(parts);
   for (const MeshTriangle& triangle : mesh.triangles) scene.corners.push_back(grid.snap(mesh, triangle));
 
-  // One set of levels for a picture that is opaque and one where it is not.
-  std::vector<std::array<int32_t, 2>> known(mesh.pictures.size(), {-1, -1});
-  const auto levels_of = [&](int32_t number, bool opaque) -> Result<int32_t> {
+  // Levels of a picture, as it is used.
+  using Kind = PictureLevels::Kind;
+  std::map<std::tuple<int32_t, Kind, int>, int32_t> known;
+  const auto levels_of = [&](int32_t number, Kind kind, int cut_off = 0) -> Result<int32_t> {
     if (number < 0) return -1;
     const Picture& picture = mesh.pictures[static_cast<size_t>(number)];
-    opaque |= !picture.has_alpha;
-    int32_t& index = known[static_cast<size_t>(number)][opaque];
-    if (index < 0) {
-      VOX_TRY(PictureLevels levels, PictureLevels::make(picture, opaque, ctx));
-      index = static_cast<int32_t>(scene.pictures.size());
+    if (kind == Kind::color && !picture.has_alpha) kind = Kind::opaque;
+    const auto [at, is_new] = known.try_emplace({number, kind, cut_off}, 0);
+    if (is_new) {
+      VOX_TRY(PictureLevels levels, PictureLevels::make(picture, kind, ctx, cut_off));
+      at->second = static_cast<int32_t>(scene.pictures.size());
       scene.pictures.push_back(std::move(levels));
     }
-    return index;
+    return at->second;
   };
+  const bool masks_cover = attributes.has(Attribute::opacity) && !has_faint_corners(mesh);
   for (MeshMaterial& material : mesh.materials) {
     if (material.alpha_mode == AlphaMode::mask && !(material.alpha_cutoff > 0))
       material.alpha_mode = AlphaMode::opaque;
     if (!options.emission) material.emission = glm::vec3(0), material.emission_picture = -1;
-    VOX_TRY(const int32_t color, levels_of(material.picture, material.alpha_mode == AlphaMode::opaque));
-    VOX_TRY(const int32_t emission, levels_of(material.emission_picture, true));
+    Kind kind = material.alpha_mode == AlphaMode::opaque ? Kind::opaque : Kind::color;
+    int cut_off = 0;
+    if (masks_cover && material.alpha_mode == AlphaMode::mask && material.picture >= 0 &&
+        mesh.pictures[static_cast<size_t>(material.picture)].has_alpha) {
+      // Texels are there or not, and levels have how many of them are.
+      kind = Kind::mask;
+      while (cut_off < 256 && static_cast<float>(cut_off) * material.color.a < 255 * material.alpha_cutoff)
+        ++cut_off;
+      material.alpha_mode = AlphaMode::blend;
+      material.color.a = 1;
+    }
+    VOX_TRY(const int32_t color, levels_of(material.picture, kind, cut_off));
+    VOX_TRY(const int32_t emission, levels_of(material.emission_picture, Kind::opaque));
+    VOX_TRY(const int32_t rm,
+            levels_of(attributes.has(Attribute::rm) ? material.rm_picture : -1, Kind::numbers));
     scene.picture_of.push_back(color);
     scene.emission_picture_of.push_back(emission);
+    scene.rm_picture_of.push_back(rm);
   }
   mesh.pictures.clear();
-  mesh.positions = {};
+  if (!attributes.has(Attribute::normal)) mesh.positions = {}, mesh.normals = {};
   scene.mesh = std::move(mesh);
   return std::make_unique<MeshSurface>(std::move(scene), grid.info(), options.tile_bits, std::move(memory),
                                        std::move(remarks));

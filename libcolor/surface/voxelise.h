@@ -24,6 +24,9 @@ struct VoxeliseOptions {
   /// does not depend on it.
   int tile_bits = 6;
   bool emission = true;  ///< is added to the colours
+  /// What voxels have beside colours. Not said: emissive where a material gives light, and emission is added;
+  /// opacity where a blended material is not opaque.
+  std::optional<AttributeSet> attributes = {};
 };
 
 /// The surface of a mesh. Its corners are snapped to a grid of 2^-8 voxel (triangle_cells.h); from there on
@@ -39,8 +42,15 @@ struct VoxeliseOptions {
 /// below its material's cut-off is not in the voxel. Where all that is in it is blended and less than half
 /// opaque there is no voxel: surfaces are there or not, and a note says where a mesh is something in between.
 ///
+/// With opacity a voxel is there from 1/255 on. Its opacity is the mean over the triangles in it of how much
+/// of them is there, by area; 255 where one covers all. Of a mask that is the share of the texels of a voxel
+/// that are not cut off. Other attributes are means as colours are: light that is emitted, which the colour
+/// has, too, up to white; normals, those of vertices between them, else that of the triangle, along the axes
+/// of voxels; roughness and metalness. The id is the number of the material that has most of the voxel.
+///
 /// Memory: 48 bytes a triangle and 11 a texel beside the mesh, and what the threads work with, which is less
-/// where ctx.memory has little. Errors: ErrorCode::usage for the resolution, ErrorCode::limit.
+/// where ctx.memory has little. Errors: ErrorCode::usage for the resolution, and for
+/// attributes that there are not, ErrorCode::limit.
 Result<std::unique_ptr<SurfaceSource>> make_surface(Mesh mesh, const VoxeliseOptions& options, Context& ctx);
 
 }  // namespace voxkit::color

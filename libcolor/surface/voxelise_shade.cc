@@ -136,8 +136,7 @@ Shade TriangleShade::shade(Float4 texel, Float4 tint, Float4 glow) const {
           cover};
 }
 
-Shade TriangleShade::at(int x, int y, int z) const {
-  if (!color_.picture && !emission_.picture && !tinted_) return plain_;
+TriangleShade::Weights TriangleShade::weights_at(int x, int y, int z) const {
   const Place from{x + 0.5 - corners_[0][0], y + 0.5 - corners_[0][1], z + 0.5 - corners_[0][2]};
   double b = weight_[0] + dot(gradient_[0], from), c = weight_[1] + dot(gradient_[1], from);
   if (double a = 1 - b - c; a < 0 || b < 0 || c < 0) {
@@ -145,18 +144,20 @@ Shade TriangleShade::at(int x, int y, int z) const {
     const double sum = a + b + c;
     b /= sum, c /= sum;
   }
-  const auto sample = [&](const Map& map, PictureWrap wrap_u, PictureWrap wrap_v, PictureFilter filter) {
-    return map.picture->sample(map.u[0] + b * map.u[1] + c * map.u[2], map.v[0] + b * map.v[1] + c * map.v[2],
-                               wrap_u, wrap_v, filter, map.detail);
-  };
+  return {b, c};
+}
+
+Shade TriangleShade::at(int x, int y, int z) const {
+  if (!color_.picture && !emission_.picture && !tinted_) return plain_;
+  const Weights weights = weights_at(x, y, z);
   Float4 texel = all_light, tint{1, 1, 1, 1}, glow = all_light;
-  if (color_.picture) texel = sample(color_, material_->wrap_u, material_->wrap_v, material_->filter);
+  if (color_.picture) texel = color_.sample(weights, material_->wrap_u, material_->wrap_v, material_->filter);
   if (emission_.picture)
-    glow =
-        sample(emission_, material_->emission_wrap_u, material_->emission_wrap_v, material_->emission_filter);
+    glow = emission_.sample(weights, material_->emission_wrap_u, material_->emission_wrap_v,
+                            material_->emission_filter);
   if (tinted_)
-    tint = tint_[0] + (tint_[1] - tint_[0]) * static_cast<float>(b) +
-           (tint_[2] - tint_[0]) * static_cast<float>(c);
+    tint = tint_[0] + (tint_[1] - tint_[0]) * static_cast<float>(weights.b) +
+           (tint_[2] - tint_[0]) * static_cast<float>(weights.c);
   return shade(texel, tint, glow);
 }
 

@@ -4,6 +4,7 @@
 #include <algorithm>
 #include <array>
 #include <cstdint>
+#include <glm/mat3x3.hpp>
 #include <vector>
 
 #include "formats/mesh/mesh.h"
@@ -17,11 +18,13 @@ namespace voxkit::color {
 struct VoxelScene {
   SurfaceKind kind = SurfaceKind::thin;
   std::vector<SnappedTriangle> corners;  ///< of mesh.triangles
-  Mesh mesh;                             ///< without its pictures and positions
+  Mesh mesh;                             ///< without its pictures, and positions that nobody needs
   size_t first_point = SIZE_MAX;
   std::vector<PictureLevels> pictures;
   /// Of a material: indices into pictures, or -1.
-  std::vector<int32_t> picture_of, emission_picture_of;
+  std::vector<int32_t> picture_of, emission_picture_of, rm_picture_of;
+  AttributeSet attributes;    ///< what voxels have beside colours
+  glm::dmat3 normal_axes{1};  ///< takes normals of the mesh to the axes of voxels, but for their length
 
   /// Which voxels a triangle is in.
   TriangleCells cells(uint32_t triangle) const {
@@ -58,22 +61,34 @@ class TriangleShade {
   /// Area of the part of the triangle that is in a voxel, in squares of its edge; 1.3 at most.
   double area_in(int x, int y, int z) const;
 
- private:
+ protected:
   using Place = std::array<double, 3>;
+  /// How much of the second and the third corner there is at a point.
+  struct Weights {
+    double b = 0, c = 0;
+  };
   /// A picture on the triangle.
   struct Map {
     const PictureLevels* picture = nullptr;
     double u[3] = {0, 0, 0}, v[3] = {0, 0, 0};  ///< at the first corner, and from there to the others
     PictureLevels::Detail detail;
+    Float4 sample(const Weights& at, PictureWrap wrap_u, PictureWrap wrap_v, PictureFilter filter) const {
+      return picture->sample(u[0] + at.b * u[1] + at.c * u[2], v[0] + at.b * v[1] + at.c * v[2], wrap_u,
+                             wrap_v, filter, detail);
+    }
   };
+  Weights weights_at(int x, int y, int z) const;
   void lay(Map& map, const PictureLevels& picture, const std::vector<glm::vec2>& uvs,
            const MeshTriangle& triangle) const;
+  const MeshMaterial* material_;
+  Map emission_;
+
+ private:
   Shade shade(Float4 texel, Float4 tint, Float4 glow) const;
   std::array<Place, 3> corners_{};
   Place gradient_[2];          ///< of the weights of the second and the third corner
   double weight_[2] = {0, 0};  ///< at the first corner
-  Map color_, emission_;
-  const MeshMaterial* material_;
+  Map color_;
   bool tinted_ = false;  ///< has colours at its corners
   Float4 tint_[3];
   Shade plain_;  ///< where it is the same everywhere

@@ -20,15 +20,17 @@ Rgb stored(uint16_t r, uint16_t g, uint16_t b) {
 Rgb stored(const Shade& shade) {
   return stored(shade.light(0), shade.light(1), shade.light(2));
 }
-Rgb stored(const ShadeMean& mean) {
+template <class Mean>
+Rgb stored(const Mean& mean) {
   const auto light = mean.light();
   return stored(light[0], light[1], light[2]);
 }
 
 }  // namespace
 
-uint64_t TileWork::bytes(int bits) {
-  return 2 * sizeof(Pair) * (most_pairs(bits) + (size_t{4} << bits)) + most_triangles * sizeof(TriangleShade);
+uint64_t TileWork::bytes(int bits, bool with_attributes) {
+  return 2 * sizeof(Pair) * (most_pairs(bits) + (size_t{4} << bits)) +
+         most_triangles * (with_attributes ? sizeof(TriangleTraits) : sizeof(TriangleShade));
 }
 
 void divide(const VoxelScene& scene, const Cube& cube, std::span<const uint32_t> triangles,
@@ -41,20 +43,28 @@ void divide(const VoxelScene& scene, const Cube& cube, std::span<const uint32_t>
 }
 
 Status TileWork::run(const VoxelScene& scene, const Cube& cube, std::span<const uint32_t> triangles,
-                     std::vector<SurfaceVoxel>& out) {
+                     VoxelBatch& out) {
+  const bool plain = scene.attributes.empty();
   if (cube.bits == 0) {
-    one_voxel(scene, cube, triangles, out);
+    if (plain)
+      one_voxel(scene, cube, triangles, out.voxels);
+    else
+      one_voxel_of_traits(scene, cube, triangles, out);
     return {};
   }
-  if (triangles.size() > most_triangles || !collect(scene, cube, triangles))
+  if (triangles.size() > most_triangles ||
+      !(plain ? collect(scene, cube, triangles, shades_) : collect(scene, cube, triangles, traits_)))
     return split(scene, cube, triangles, out);
   sort(3 * cube.bits);
-  color(cube, out);
+  if (plain)
+    color(cube, out.voxels);
+  else
+    color_and_attribute(scene, cube, out);
   return {};
 }
 
 Status TileWork::split(const VoxelScene& scene, const Cube& cube, std::span<const uint32_t> triangles,
-                       std::vector<SurfaceVoxel>& out) {
+                       VoxelBatch& out) {
   VOX_CHECK(check_interrupt());
   std::array<std::vector<uint32_t>, 8> lists;
   divide(scene, cube, triangles, lists);
@@ -79,14 +89,31 @@ void TileWork::one_voxel(const VoxelScene& scene, const Cube& cube, std::span<co
   if (mean.there()) out.push_back({first_place(cube), stored(mean)});
 }
 
+void TileWork::one_voxel_of_traits(const VoxelScene& scene, const Cube& cube,
+                                   std::span<const uint32_t> triangles, VoxelBatch& out) {
+  TraitMean mean;
+  for (const uint32_t triangle : triangles)
+    scene.cells(triangle).each_cell(
+        cube, [] {},
+        [&](uint64_t) {
+          const TriangleTraits traits(scene, triangle, cube.lo);
+          mean.add(traits.traits_at(0, 0, 0), traits.area_in(0, 0, 0));
+        });
+  if (!mean.there(scene.attributes)) return;
+  out.voxels.push_back({first_place(cube), stored(mean)});
+  mean.append_to(out.attributes, scene.attributes);
+}
+
 /// False where there are too many pairs.
-bool TileWork::collect(const VoxelScene& scene, const Cube& cube, std::span<const uint32_t> triangles) {
+template <class OfTriangle>
+bool TileWork::collect(const VoxelScene& scene, const Cube& cube, std::span<const uint32_t> triangles,
+                       std::vector<OfTriangle>& list) {
   count_ = 0;
-  shades_.clear();
+  list.clear();
   const size_t limit = most_pairs(cube.bits), row = TriangleCells::most_in_row(cube);
   bool fits = true;
   for (const uint32_t triangle : triangles) {
-    const auto number = static_cast<uint64_t>(shades_.size());
+    const auto number = static_cast<uint64_t>(list.size());
     const size_t before = count_;
     scene.cells(triangle).each_cell(
         cube,
@@ -99,7 +126,7 @@ bool TileWork::collect(const VoxelScene& scene, const Cube& cube, std::span<cons
         },
         [&](uint64_t code) { pairs_[count_++] = code << 32 | number; });
     if (!fits) return false;
-    if (count_ > before) shades_.emplace_back(scene, triangle, cube.lo);
+    if (count_ > before) list.emplace_back(scene, triangle, cube.lo);
   }
   return true;
 }
@@ -154,6 +181,26 @@ void TileWork::color(const Cube& cube, std::vector<SurfaceVoxel>& out) const {
       if (mean.there()) put(code, stored(mean));
     }
     i = end;
+  }
+}
+
+void TileWork::color_and_attribute(const VoxelScene& scene, const Cube& cube, VoxelBatch& out) const {
+  const uint64_t first = first_place(cube);
+  out.voxels.reserve(out.voxels.size() + count_);
+  out.attributes.reserve(out.attributes.size() + count_ * scene.attributes.bytes());
+  for (size_t i = 0; i < count_;) {
+    const auto code = static_cast<uint32_t>(pairs_[i] >> 32);
+    const glm::ivec3 at = morton_place(code);
+    const auto is_here = [&](size_t pair) { return pair < count_ && pairs_[pair] >> 32 == code; };
+    const bool alone = !is_here(i + 1);
+    TraitMean mean;
+    for (; is_here(i); ++i) {
+      const TriangleTraits& traits = traits_[static_cast<uint32_t>(pairs_[i])];
+      mean.add(traits.traits_at(at.x, at.y, at.z), alone ? 0 : traits.area_in(at.x, at.y, at.z));
+    }
+    if (!mean.there(scene.attributes)) continue;
+    out.voxels.push_back({first | code, stored(mean)});
+    mean.append_to(out.attributes, scene.attributes);
   }
 }
 

@@ -70,7 +70,7 @@ class Terrain final : public SurfaceSource {
       return false;
     };
     return read_in_batches<Job>({job_bits, all_bits_, sizeof(Tile) + (uint64_t{1} << 17)}, sink, ctx, next,
-                                [&](const Job& job, auto& out) { return make(job, out); });
+                                [&](const Job& job, VoxelBatch& out) { return make(job, out.voxels); });
   }
 
  private:

@@ -167,18 +167,38 @@ TEST_F(MagicaVoxel, ModelsWithoutASceneAreFrames) {
   EXPECT_TRUE(read(file(model(1, 1, 1, {{0, 0, 0, 1}})))->notes.empty());
 }
 
-TEST_F(MagicaVoxel, WhatVoxelsCannotSayIsNoted) {
-  const std::string glass = chunk("MATL", number(1) + dictionary({{"_type", "_glass"}, {"_trans", "0.9"}}));
-  const auto scene = read(file(model(1, 1, 1, {{0, 0, 0, 1}}) + glass));
-  ASSERT_TRUE(scene);
-  ASSERT_EQ(scene->notes.size(), 1u);
-  EXPECT_NE(scene->notes[0].find("materials of 1 colors"), std::string::npos);
-  // Of a colour that no voxel has it does not matter.
-  EXPECT_TRUE(read(file(model(1, 1, 1, {{0, 0, 0, 2}}) + glass))->notes.empty());
+TEST_F(MagicaVoxel, HiddenPartsAreNoted) {
   const auto hidden =
       read(file(model(1, 1, 1, {{0, 0, 0, 1}}) + transform(0, 1, {}, {{"_hidden", "1"}}) + shape(1, 0)));
   ASSERT_TRUE(hidden);
   EXPECT_EQ(hidden->notes, (std::vector<std::string>{"dropped: 1 parts of the scene that are hidden"}));
+}
+
+TEST_F(MagicaVoxel, MaterialsOfColors) {
+  const auto material = [](uint32_t id, std::map<std::string, std::string> words, const std::string& type) {
+    if (!type.empty()) words["_type"] = type;
+    return chunk("MATL", number(id) + dictionary(words));
+  };
+  const auto scene = read(file(
+      model(1, 1, 1, {{0, 0, 0, 1}}) + material(1, {{"_trans", "0.9"}, {"_alpha", "0.1"}}, "_glass") +
+      material(2, {{"_emit", "0.5"}}, "_emit") + material(3, {{"_emit", "0.5"}, {"_flux", "2"}}, "_emit") +
+      material(4, {{"_metal", "0.75"}, {"_rough", "0.25"}}, "_metal") + material(5, {}, "_media") +
+      material(6, {{"_weight", "0.5"}}, "_glass") + material(7, {{"_emit", "nan"}}, "_emit") +
+      material(8, {{"_rough", "0.3"}}, "") + material(4000, {}, "_emit")));
+  ASSERT_TRUE(scene) << scene.error().what;
+  const auto& m = scene->materials;
+  EXPECT_EQ(scene->voxels.at(0).number, 1);
+  EXPECT_NEAR(m[1].opacity, 0.1, 1e-6);
+  EXPECT_EQ(m[2].emission, 0.5f);
+  EXPECT_EQ(m[3].emission, 1);
+  EXPECT_EQ(m[4].metalness, 0.75f);
+  EXPECT_EQ(m[4].roughness, 0.25f);
+  EXPECT_TRUE(m[5].special);
+  EXPECT_EQ(m[6].opacity, 0.5f);
+  EXPECT_EQ(m[7].emission, 1);
+  EXPECT_EQ(m[8].roughness, 1);
+  EXPECT_EQ(m[9].opacity, 1);
+  EXPECT_TRUE(scene->notes.empty());
 }
 
 TEST_F(MagicaVoxel, BrokenFilesAreRefused) {

@@ -51,7 +51,9 @@ class MeshTest : public testing::Test {
     return std::move(*made);
   }
 
-  std::vector<SurfaceVoxel> voxelise(Mesh mesh, const VoxeliseOptions& options) {
+  /// Without attributes where nothing is said.
+  std::vector<SurfaceVoxel> voxelise(Mesh mesh, VoxeliseOptions options) {
+    if (!options.attributes) options.attributes.emplace();
     auto surface = make_surface(std::move(mesh), options, ctx_);
     EXPECT_TRUE(surface) << surface.error().what;
     if (!surface) return {};

@@ -213,7 +213,7 @@ TEST_F(VoxeliseColorTest, WhatIsBlendedIsThereFromAHalfOn) {
     mesh.materials[0].alpha_mode = mode;
     add_square(mesh, 1, 0);
     add_square(mesh, 1, 1, 3);  // opaque, elsewhere
-    auto surface = make_surface(std::move(mesh), {4}, ctx_);
+    auto surface = make_surface(std::move(mesh), {.resolution = 4, .attributes = AttributeSet()}, ctx_);
     EXPECT_TRUE(surface);
     const bool noted = !(*surface)->notes().empty();
     size_t red = 0;

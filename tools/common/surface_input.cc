@@ -25,13 +25,23 @@ Surface voxelise(const std::string& name, const SurfaceOptions& options, Context
   voxelise.kind = options.kind;
   voxelise.emission = options.emission;
   voxelise.resolution = options.resolution;
+  voxelise.attributes = options.attributes;
+  const auto is_wanted = [&](color::Attribute a) { return options.attributes && options.attributes->has(a); };
   if (is_points_name(name)) {
-    VOX_TRY(auto points, open_points(name));
+    PointExtras extras;
+    extras.alpha = !options.attributes || is_wanted(color::Attribute::opacity);
+    extras.normals = is_wanted(color::Attribute::normal);
+    extras.rm = is_wanted(color::Attribute::rm);
+    extras.labels = is_wanted(color::Attribute::id);
+    VOX_TRY(auto points, open_points(name, extras));
     if (points)
-      return color::surface_of_points(std::move(points),
-                                      options.resolution.value_or(color::default_resolution), ctx);
+      return color::surface_of_points(
+          std::move(points), options.resolution.value_or(color::default_resolution), ctx, options.attributes);
   }
-  VOX_TRY(Mesh mesh, read_mesh(name, ctx, {.allow_outside = options.open.allow_outside}));
+  VOX_TRY(Mesh mesh, read_mesh(name, ctx,
+                               {.allow_outside = options.open.allow_outside,
+                                .normals = is_wanted(color::Attribute::normal),
+                                .rm = is_wanted(color::Attribute::rm)}));
   return color::make_surface(std::move(mesh), voxelise, ctx);
 }
 
@@ -67,14 +77,17 @@ Surface open_any(const std::string& name, const SurfaceOptions& options, Context
   if (color::is_terrain(name)) return color::open_terrain(name);
   if (has_ending(name, ".vox")) {
     VOX_TRY(VoxelScene scene, read_magicavoxel(name, ctx, options.frame.value_or(0)));
-    return color::surface_of(std::move(scene), ctx);
+    return color::surface_of(std::move(scene), ctx, options.attributes, options.emission);
   }
   OpenOptions open = options.open;
   open.other_kinds += "meshes (.obj .gltf .glb .ply .stl .3ds), points (.ply .pcd .las), models (.vox), ";
   VOX_TRY(Input input, open_input(name, open, ctx));
   if (input.color) return reopened(name, std::move(input.color), options.resolution);
   if (options.resolution) return has_voxels(name);
-  return color::surface_of(std::move(input.source));
+  // Built-ins are opaque.
+  std::optional<color::AttributeSet> wanted = options.attributes;
+  if (!wanted && is_builtin(name)) wanted.emplace();
+  return color::surface_of(std::move(input.source), wanted, ctx);
 }
 
 }  // namespace

@@ -17,6 +17,8 @@ struct SurfaceOptions {
   color::SurfaceKind kind = color::SurfaceKind::thin;
   bool emission = true;           ///< of meshes: is added to the colours
   std::optional<uint32_t> frame;  ///< of an animated .vox model
+  /// What voxels have beside colours; nothing: emissive and opacity where the input has them.
+  std::optional<color::AttributeSet> attributes = color::AttributeSet();
 };
 
 /// Opens a surface; it can be read once. ErrorCode::usage where the options do not go with it.
