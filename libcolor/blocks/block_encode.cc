@@ -23,17 +23,16 @@ class PartWriter {
 
   void add(const MacroColors& colors, const Fitter& fitter, const std::vector<PlannedBlock>& plan) {
     const uint64_t weights = begin_macro_block(0);
-    std::vector<uint8_t> run;
+    std::vector<uint8_t> run(colors.size() + color_vector);
     for (const PlannedBlock& block : plan) {
       const uint64_t offset = block.bits == 0 ? no_weights : weights_.size() - weights;
       const uint32_t bits = block.bits == 0 ? 0 : static_cast<uint32_t>(block.bits - 1);
       add_header(block.first | bits << 14 | static_cast<uint32_t>(offset) << 16, block);
-      if (block.bits > 0) {
-        run.resize(block.last - block.first);
-        fitter.weights(block.fit, block.first, block.last, block.bits, run.data());
-        for (const uint8_t weight : run) weights_.add(weight, block.bits);
-      }
-      add_error(colors, block, run);
+      const uint32_t most_squared =
+          fitter.weights(block.fit, block.first, block.last, block.bits, run.data());
+      if (block.bits > 0)
+        for (uint32_t i = 0; i < block.last - block.first; ++i) weights_.add(run[i], block.bits);
+      add_error(colors, block, run, most_squared);
     }
   }
   /// A macro block of colours as they are.
@@ -58,9 +57,10 @@ class PartWriter {
   }
 
  private:
-  /// Squared errors are of RGB, wherever distances are measured. `weights`: of a block that has any.
-  void add_error(const MacroColors& colors, const PlannedBlock& block, std::span<const uint8_t> weights) {
-    const uint32_t furthest = std::max(part_.most_squared, block.fit.most_squared);
+  /// Squared errors are of RGB, wherever distances are measured.
+  void add_error(const MacroColors& colors, const PlannedBlock& block, std::span<const uint8_t> weights,
+                 uint32_t most_squared) {
+    const uint32_t furthest = std::max(part_.most_squared, most_squared);
     if (colors.space() == ErrorSpace::rgb) {
       part_.squared_error += block.fit.squared_error;
     } else {
@@ -106,16 +106,16 @@ uint64_t cost_of(const std::vector<PlannedBlock>& plan, Endpoints endpoints) {
   return cost;
 }
 
-std::vector<PlannedBlock> plan_of(const MacroColors& colors, const Fitter& fitter, Endpoints endpoints,
-                                  uint32_t allowed, const BlockOptions& options) {
+const std::vector<PlannedBlock>& plan_of(const MacroColors& colors, const Fitter& fitter, Endpoints endpoints,
+                                         uint32_t allowed, const BlockOptions& options, PlanMemory& memory) {
   if (options.weight_bits > 0)
-    return merge_greedily(colors, fitter, endpoints, options.weight_bits, options.weight_bits);
-  if (options.effort == 1) return merge_greedily(colors, fitter, endpoints, 0, most_weight_bits);
-  std::vector<PlannedBlock> plan = parse_optimally(colors, fitter, endpoints, options.effort);
+    return merge_greedily(colors, fitter, endpoints, options.weight_bits, options.weight_bits, memory);
+  if (options.effort == 1) return merge_greedily(colors, fitter, endpoints, 0, most_weight_bits, memory);
+  const auto& plan = parse_optimally(colors, fitter, endpoints, options.effort, memory);
   if (options.effort < greedy_too) return plan;
   // Not all ends of blocks are tried: now and then what greedy merging finds is less.
   const Fitter plain(colors, endpoints, allowed, 1);
-  std::vector<PlannedBlock> greedy = merge_greedily(colors, plain, endpoints, 0, most_weight_bits);
+  const auto& greedy = merge_greedily(colors, plain, endpoints, 0, most_weight_bits, memory);
   return cost_of(greedy, endpoints) < cost_of(plan, endpoints) ? greedy : plan;
 }
 
@@ -145,12 +145,14 @@ EncodedPart encode_part(std::span<const Rgb> colors, Endpoints endpoints, const 
   const uint32_t allowed = allowed_of(options);
   const size_t macro_blocks = (colors.size() + macro_block_colors - 1) / macro_block_colors;
   PartWriter writer(endpoints, macro_blocks);
+  MacroColors macro;
+  PlanMemory memory;
   for (size_t m = 0; m < macro_blocks; ++m) {
     const size_t first = m * macro_block_colors;
     const auto own = colors.subspan(first, std::min<size_t>(macro_block_colors, colors.size() - first));
-    const MacroColors macro(own, options.space);
+    macro.assign(own, options.space);
     const Fitter fitter(macro, endpoints, allowed, options.effort);
-    const std::vector<PlannedBlock> plan = plan_of(macro, fitter, endpoints, allowed, options);
+    const auto& plan = plan_of(macro, fitter, endpoints, allowed, options, memory);
     if (cost_of(plan, endpoints) >= 8 * value_bytes(endpoints) * own.size())
       writer.add_raw(own);
     else

@@ -1,6 +1,7 @@
 #include "libcolor/blocks/block_fit.h"
 
 #include <algorithm>
+#include <bit>
 #include <cmath>
 
 #include "libcolor/blocks/directions.h"
@@ -8,8 +9,6 @@
 
 namespace voxkit::color {
 namespace {
-
-constexpr size_t vector_size = 8;
 
 using Vec3 = std::array<double, 3>;
 
@@ -34,17 +33,17 @@ Line line_of(const MacroColors::Sums& s, double count) {
   line.axis = {0, 0, 0};
   line.residual = 0;
   if (trace <= 0) return line;
+  // To a trace of 1/2 to 1 by a power of two. In so few squarings it stays above 2^-82.
+  constexpr uint64_t exponent = uint64_t{0x7ff} << 52;
+  const double scale =
+      std::bit_cast<double>((uint64_t{2045} << 52) - (std::bit_cast<uint64_t>(trace) & exponent));
   std::array<double, 6> m;
-  for (size_t i = 0; i < 6; ++i) m[i] = c[i] / trace;
+  for (size_t i = 0; i < 6; ++i) m[i] = c[i] * scale;
   constexpr int squarings = 5;  // the ratio of two eigenvalues to the power of 32
-  for (int k = 0; k < squarings; ++k) {
-    const std::array<double, 6> q = {
-        m[0] * m[0] + m[3] * m[3] + m[4] * m[4], m[3] * m[3] + m[1] * m[1] + m[5] * m[5],
-        m[4] * m[4] + m[5] * m[5] + m[2] * m[2], m[0] * m[3] + m[3] * m[1] + m[4] * m[5],
-        m[0] * m[4] + m[3] * m[5] + m[4] * m[2], m[3] * m[4] + m[1] * m[5] + m[5] * m[2]};
-    const double scale = 1 / (q[0] + q[1] + q[2]);
-    for (size_t i = 0; i < 6; ++i) m[i] = q[i] * scale;
-  }
+  for (int k = 0; k < squarings; ++k)
+    m = {m[0] * m[0] + m[3] * m[3] + m[4] * m[4], m[3] * m[3] + m[1] * m[1] + m[5] * m[5],
+         m[4] * m[4] + m[5] * m[5] + m[2] * m[2], m[0] * m[3] + m[3] * m[1] + m[4] * m[5],
+         m[0] * m[4] + m[3] * m[5] + m[4] * m[2], m[3] * m[4] + m[1] * m[5] + m[5] * m[2]};
   // Any column that is not zero points along the axis; the longest is the most exact.
   Vec3 axis = {m[0], m[3], m[4]};
   if (m[1] > m[0] && m[1] >= m[2]) axis = {m[3], m[1], m[5]};
@@ -69,10 +68,12 @@ std::array<float, 3> point_in(ErrorSpace space, Rgb color) {
 
 }  // namespace
 
-MacroColors::MacroColors(std::span<const Rgb> colors, ErrorSpace space)
-    : size_(static_cast<uint32_t>(colors.size())), space_(space) {
-  for (auto& channel : channels_) channel.resize(colors.size() + vector_size);
+void MacroColors::assign(std::span<const Rgb> colors, ErrorSpace space) {
+  size_ = static_cast<uint32_t>(colors.size());
+  space_ = space;
+  for (auto& channel : channels_) channel.resize(colors.size() + color_vector);
   prefix_.resize(colors.size() + 1);
+  prefix_[0] = {};
   Sums sums{};
   for (size_t i = 0; i < colors.size(); ++i) {
     const uint32_t r = colors[i].r, g = colors[i].g, b = colors[i].b;
@@ -84,7 +85,7 @@ MacroColors::MacroColors(std::span<const Rgb> colors, ErrorSpace space)
     channels_[2][i] = static_cast<float>(b);
   }
   if (space == ErrorSpace::rgb) return;
-  for (auto& channel : lab_) channel.resize(colors.size() + vector_size);
+  for (auto& channel : lab_) channel.resize(colors.size() + color_vector);
   for (size_t i = 0; i < colors.size(); ++i) {
     // Neighbours are often equal.
     const LabPoint point = i > 0 && colors[i] == colors[i - 1]
@@ -127,17 +128,8 @@ Fit Fitter::fit(uint32_t first, uint32_t last, int bits) const {
   return bits == 0 ? fit_single(first, last) : fit_line(first, last, bits);
 }
 
-[[gnu::always_inline]] inline Distances Fitter::distances(const Fit& fit, uint32_t first, uint32_t last,
-                                                          int bits, uint8_t* weights) const {
-  const uint32_t most = bits == 0 ? 1 : (1u << bits) - 1;
-  if (colors_.space() == ErrorSpace::rgb)
-    return kernels_.distances(run_of(colors_, first, last), floats(fit.a), floats(fit.b),
-                              static_cast<int>(most), allowed_, weights);
-  return lab_distances(fit, first, last, most, weights);
-}
-
-[[gnu::noinline]] Distances Fitter::lab_distances(const Fit& fit, uint32_t first, uint32_t last,
-                                                  uint32_t most, uint8_t* weights) const {
+Distances Fitter::lab_distances(const Fit& fit, uint32_t first, uint32_t last, uint32_t most,
+                                uint8_t* weights) const {
   std::array<LabPoint, 1 << most_weight_bits> steps;
   const uint32_t count = fit.a == fit.b ? 1 : most + 1;
   for (uint32_t w = 0; w < count; ++w) steps[w] = point_in(colors_.space(), mix(fit.a, fit.b, w, most));
@@ -149,24 +141,31 @@ Fit Fitter::fit(uint32_t first, uint32_t last, int bits) const {
 
 Fit Fitter::fit_single(uint32_t first, uint32_t last) const {
   const uint32_t count = last - first;
+  Fit fit;
+  if (count == 1) {
+    fit.feasible = true;
+    fit.a = fit.b = colors_.color(first);
+    return fit;
+  }
   const MacroColors::Sums s = colors_.sums(first, last);
   const auto mean = [&](size_t c) { return static_cast<uint8_t>((2 * s[c] + count) / (2 * count)); };
-  Fit fit;
   fit.a = fit.b = {mean(0), mean(1), mean(2)};
-  fit.most_squared = allowed_ + 1;
-  if (colors_.space() == ErrorSpace::rgb) {
-    // Of all single colours the mean has the least error, but for its rounding.
-    const uint64_t squares = uint64_t{s[3]} + s[4] + s[5];
-    const auto cross = [&](size_t c, uint8_t v) {
-      return uint64_t{v} * (2 * uint64_t{s[c]} - uint64_t{v} * count);
-    };
-    fit.squared_error = squares - cross(0, fit.a.r) - cross(1, fit.a.g) - cross(2, fit.a.b);
-    if (fit.squared_error > uint64_t{allowed_} * count) return fit;
+  if (colors_.space() != ErrorSpace::rgb) {
+    const Distances d = lab_distances(fit, first, last, 1, nullptr);
+    fit.squared_error = d.sum;
+    fit.feasible = d.most <= allowed_;
+    return fit;
   }
-  const Distances d = distances(fit, first, last, 0, nullptr);
-  fit.squared_error = d.sum;
-  fit.most_squared = d.most;
-  fit.feasible = d.most <= allowed_;
+  // Of all single colours the mean has the least error, but for its rounding.
+  const uint64_t squares = uint64_t{s[3]} + s[4] + s[5];
+  const auto cross = [&](size_t c, uint8_t v) {
+    return uint64_t{v} * (2 * uint64_t{s[c]} - uint64_t{v} * count);
+  };
+  fit.squared_error = squares - cross(0, fit.a.r) - cross(1, fit.a.g) - cross(2, fit.a.b);
+  if (fit.squared_error > uint64_t{allowed_} * count) return fit;
+  // No square is greater than the sum of them all.
+  fit.feasible =
+      fit.squared_error <= allowed_ || kernels_.within(run_of(colors_, first, last), floats(fit.a), allowed_);
   return fit;
 }
 
@@ -174,53 +173,54 @@ Fit Fitter::fit_line(uint32_t first, uint32_t last, int bits) const {
   const ColorRun run = run_of(colors_, first, last);
   const int most = (1 << bits) - 1;
   const Line line = line_of(colors_.sums(first, last), run.size);
+  const LineTries tries{
+      {static_cast<float>(line.mean[0]), static_cast<float>(line.mean[1]), static_cast<float>(line.mean[2])},
+      line.axis,
+      static_cast<float>(line.mean[0] * line.axis[0] + line.mean[1] * line.axis[1] +
+                         line.mean[2] * line.axis[2]),
+      endpoints_,
+      tries_};
   Fit best;
+  if (colors_.space() != ErrorSpace::rgb) return fit_lab_line(first, last, bits, tries);
   // No line does better than this one; what is decoded is off the line by less than rounding may move it.
   constexpr double rounding = 0.87;
   const double reach = std::sqrt(static_cast<double>(allowed_)) + rounding;
-  const bool rgb = colors_.space() == ErrorSpace::rgb;
-  if (rgb && line.residual > reach * reach) return best;
-  const Extent extent = kernels_.extent(run, line.axis);
-  const auto center = static_cast<float>(line.mean[0] * line.axis[0] + line.mean[1] * line.axis[1] +
-                                         line.mean[2] * line.axis[2]);
-  const float lo = extent.least - center, hi = extent.most - center;
-  // Ends may lie inside of the outermost colours, in half cells: 1 gives the least greatest error where
-  // colours lie anywhere between the ends, 0 where they lie near these. The first that is feasible is taken.
-  constexpr std::array<std::array<float, 2>, 11> insets = {{{1, 1},
-                                                            {0, 0},
-                                                            {0.5f, 0.5f},
-                                                            {0.75f, 0.75f},
-                                                            {0.25f, 0.25f},
-                                                            {1, 0.5f},
-                                                            {0.5f, 1},
-                                                            {1.4f, 1.4f},
-                                                            {0, 0.5f},
-                                                            {0.5f, 0},
-                                                            {1, 0}}};
-  const float half_cell = (hi - lo) / static_cast<float>(2 * (most + 1));
+  if (line.residual > reach * reach) return best;
+  const LineFit fit = kernels_.line(run, tries, most, allowed_);
+  return {fit.feasible, fit.a, fit.b, fit.squared_error};
+}
+
+Fit Fitter::fit_lab_line(uint32_t first, uint32_t last, int bits, const LineTries& line) const {
+  const Extent extent = kernels_.extent(run_of(colors_, first, last), line.axis);
+  const float lo = extent.least - line.center, hi = extent.most - line.center;
+  const float half_cell = (hi - lo) / static_cast<float>(2 << bits);
   const auto end = [&](float t) {
     std::array<float, 3> color;
-    for (size_t c = 0; c < 3; ++c) color[c] = static_cast<float>(line.mean[c]) + t * line.axis[c];
+    for (size_t c = 0; c < 3; ++c) color[c] = line.mean[c] + t * line.axis[c];
     return quantised(color);
   };
-  for (size_t i = 0; i < static_cast<size_t>(tries_) && !best.feasible; ++i) {
-    best.a = end(lo + insets[i][0] * half_cell);
-    best.b = end(hi - insets[i][1] * half_cell);
-    const Distances d = distances(best, first, last, bits, nullptr);
-    best.most_squared = d.most;
+  Fit best;
+  for (int i = 0; i < line.tries && !best.feasible; ++i) {
+    const float* const inset = line_insets + 8 * (i / 4) + i % 4;
+    best.a = end(lo + inset[0] * half_cell);
+    best.b = end(hi + inset[4] * half_cell);
+    const Distances d = lab_distances(best, first, last, (1u << bits) - 1, nullptr);
     best.squared_error = d.sum;
     best.feasible = d.most <= allowed_;
     // Other ends are near these: where one colour is far off they do not help.
     constexpr uint32_t hopeless = 6;
-    if (!rgb && d.most / hopeless > allowed_) break;
+    if (d.most / hopeless > allowed_) break;
   }
   return best;
 }
 
-void Fitter::weights(const Fit& fit, uint32_t first, uint32_t last, int bits, uint8_t* out) const {
-  std::vector<uint8_t> room(last - first + vector_size);
-  distances(fit, first, last, bits, room.data());
-  std::copy_n(room.begin(), last - first, out);
+uint32_t Fitter::weights(const Fit& fit, uint32_t first, uint32_t last, int bits, uint8_t* out) const {
+  const uint32_t most = bits == 0 ? 1 : (1u << bits) - 1;
+  if (colors_.space() != ErrorSpace::rgb) return lab_distances(fit, first, last, most, out).most;
+  return kernels_
+      .distances(run_of(colors_, first, last), floats(fit.a), floats(fit.b), static_cast<int>(most), allowed_,
+                 out)
+      .most;
 }
 
 }  // namespace voxkit::color

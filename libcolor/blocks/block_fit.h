@@ -15,8 +15,12 @@ namespace voxkit::color {
 /// The colours of a macro block as the encoder works on them.
 class MacroColors {
  public:
+  MacroColors() = default;
+  explicit MacroColors(std::span<const Rgb> colors, ErrorSpace space = ErrorSpace::rgb) {
+    assign(colors, space);
+  }
   /// 1 to 16384 colours, whose distances will be measured in `space`.
-  explicit MacroColors(std::span<const Rgb> colors, ErrorSpace space = ErrorSpace::rgb);
+  void assign(std::span<const Rgb> colors, ErrorSpace space);
   uint32_t size() const { return size_; }
   Rgb color(uint32_t i) const;
 
@@ -30,8 +34,8 @@ class MacroColors {
   ErrorSpace space() const { return space_; }
 
  private:
-  uint32_t size_;
-  ErrorSpace space_;
+  uint32_t size_ = 0;
+  ErrorSpace space_ = ErrorSpace::rgb;
   std::array<std::vector<float>, 3> channels_, lab_;
   std::vector<Sums> prefix_;
 };
@@ -40,8 +44,7 @@ class MacroColors {
 struct Fit {
   bool feasible = false;       ///< no decoded colour is further than allowed
   Rgb a, b;                    ///< both ends, as decoded
-  uint32_t most_squared = 0;   ///< greatest squared distance; in CIELAB times lab_scale^2
-  uint64_t squared_error = 0;  ///< sum of squared distances
+  uint64_t squared_error = 0;  ///< sum of squared distances, where feasible
 };
 
 /// Fits runs of colours.
@@ -53,14 +56,15 @@ class Fitter {
       : colors_(colors), endpoints_(endpoints), allowed_(allowed), tries_(effort + 1) {}
   /// The colours first .. last, half open, with `bits` bits a weight, 0 to 4.
   Fit fit(uint32_t first, uint32_t last, int bits) const;
-  /// The weights of a fit with at least one bit, in order.
-  void weights(const Fit& fit, uint32_t first, uint32_t last, int bits, uint8_t* out) const;
+  /// The greatest squared distance of a fit; in CIELAB times lab_scale^2. `out`: the weights, in order, with
+  /// room for color_vector more.
+  uint32_t weights(const Fit& fit, uint32_t first, uint32_t last, int bits, uint8_t* out) const;
 
  private:
   Fit fit_single(uint32_t first, uint32_t last) const;
   Fit fit_line(uint32_t first, uint32_t last, int bits) const;
+  Fit fit_lab_line(uint32_t first, uint32_t last, int bits, const LineTries& line) const;
   /// How far decoded colours are from what they were; `weights`: if not null, those that they get.
-  Distances distances(const Fit& fit, uint32_t first, uint32_t last, int bits, uint8_t* weights) const;
   Distances lab_distances(const Fit& fit, uint32_t first, uint32_t last, uint32_t most,
                           uint8_t* weights) const;
   Rgb quantised(const std::array<float, 3>& color) const;

@@ -5,36 +5,33 @@
 namespace voxkit::color {
 namespace {
 
-/// A block of the list that is merged.
-struct Item {
-  uint32_t first, last;
-  uint32_t left, right;  ///< neighbours in the list
-  bool merged = false;   ///< in this round of bits
-  bool tried = false;    ///< whether `joined` is known
-  Fit fit;               ///< of a merged block
-  Fit joined;            ///< with the right neighbour
-};
-
 /// The list of Algorithm 1.
 class List {
  public:
   static constexpr uint32_t end = ~uint32_t{0};
 
-  List(std::vector<Item> items, const Fitter& fitter, int bits)
-      : items_(std::move(items)), fitter_(fitter), bits_(bits) {}
+  /// Of units, one after the other.
+  List(const std::vector<MergeUnit>& units, const Fitter& fitter, int bits, std::vector<MergeItem>& memory)
+      : items_(memory), fitter_(fitter), bits_(bits) {
+    items_.clear();
+    items_.reserve(units.size());
+    const auto count = static_cast<uint32_t>(units.size());
+    for (uint32_t i = 0; i < count; ++i)
+      items_.push_back({units[i].first, units[i].last, i - 1, i + 1 == count ? end : i + 1});
+  }
 
-  std::vector<Item> merge() {
+  /// Calls visit(item) for what is left, in order.
+  template <class Visit>
+  void merge(const Visit& visit) {
     while (pass()) {
     }
-    std::vector<Item> left;
-    for (uint32_t i = 0; i != end; i = items_[i].right) left.push_back(items_[i]);
-    return left;
+    for (uint32_t i = 0; i != end; i = items_[i].right) visit(items_[i]);
   }
 
  private:
   /// The fit of an item and its right neighbour, which it has.
   const Fit& joined(uint32_t i) {
-    Item& item = items_[i];
+    MergeItem& item = items_[i];
     if (!item.tried) {
       item.joined = fitter_.fit(item.first, items_[item.right].last, bits_);
       item.tried = true;
@@ -43,8 +40,8 @@ class List {
   }
   /// An item takes in its right neighbour.
   void take_right(uint32_t i) {
-    Item& item = items_[i];
-    const Item& right = items_[item.right];
+    MergeItem& item = items_[i];
+    const MergeItem& right = items_[item.right];
     item.fit = item.joined;
     item.last = right.last;
     item.right = right.right;
@@ -58,7 +55,7 @@ class List {
     bool any = false;
     uint32_t i = items_[0].right;
     while (i != end) {
-      const Item& item = items_[i];
+      const MergeItem& item = items_[i];
       const Fit& left = joined(item.left);
       const Fit* const right = item.right != end ? &joined(i) : nullptr;
       const bool right_feasible = right != nullptr && right->feasible;
@@ -80,57 +77,51 @@ class List {
     return any;
   }
 
-  std::vector<Item> items_;
+  std::vector<MergeItem>& items_;
   const Fitter& fitter_;
   int bits_;
 };
 
-/// A run of colours with the cheapest blocks known for it.
-struct Unit {
-  uint32_t first, last;
-  uint64_t cost;
-  std::vector<PlannedBlock> blocks;
-};
-
 }  // namespace
 
-std::vector<PlannedBlock> merge_greedily(const MacroColors& colors, const Fitter& fitter, Endpoints endpoints,
-                                         int least_bits, int most_bits) {
-  std::vector<Unit> units(colors.size());
+const std::vector<PlannedBlock>& merge_greedily(const MacroColors& colors, const Fitter& fitter,
+                                                Endpoints endpoints, int least_bits, int most_bits,
+                                                PlanMemory& memory) {
+  std::vector<MergeUnit>&units = memory.units, &merged = memory.merged_units;
+  std::vector<PlannedBlock>&plan = memory.merged, &cheaper = memory.cheaper;
+  units.clear();
+  plan.clear();
   for (uint32_t i = 0; i < colors.size(); ++i) {
-    units[i] = {i, i + 1, block_cost(1, least_bits, endpoints), {}};
-    units[i].blocks.push_back({i, i + 1, least_bits, fitter.fit(i, i + 1, least_bits)});
+    units.push_back({i, i + 1, 1, block_cost(1, least_bits, endpoints)});
+    plan.push_back({i, i + 1, least_bits, fitter.fit(i, i + 1, least_bits)});
   }
   for (int bits = least_bits; bits <= most_bits; ++bits) {
-    const auto count = static_cast<uint32_t>(units.size());
-    std::vector<Item> items(count);
-    for (uint32_t i = 0; i < count; ++i) {
-      items[i].first = units[i].first;
-      items[i].last = units[i].last;
-      items[i].left = i == 0 ? List::end : i - 1;
-      items[i].right = i + 1 == count ? List::end : i + 1;
-    }
-    std::vector<Unit> merged;
-    size_t next = 0;
-    for (const Item& item : List(std::move(items), fitter, bits).merge()) {
-      Unit unit = std::move(units[next++]);
-      for (; next < units.size() && units[next].first < item.last; ++next) {
-        unit.cost += units[next].cost;
-        unit.blocks.insert(unit.blocks.end(), units[next].blocks.begin(), units[next].blocks.end());
+    merged.clear();
+    cheaper.clear();
+    auto unit = units.cbegin();
+    auto block = plan.cbegin();
+    List(units, fitter, bits, memory.items).merge([&](const MergeItem& item) {
+      MergeUnit own{item.first, item.last, 0, 0};
+      for (; unit != units.cend() && unit->first < item.last; ++unit) {
+        own.cost += unit->cost;
+        own.blocks += unit->blocks;
       }
-      unit.last = item.last;
+      const auto next = block + own.blocks;
       // A tie goes to the parent: fewer blocks.
-      if (const uint64_t own = block_cost(item.last - item.first, bits, endpoints);
-          item.merged && own <= unit.cost) {
-        unit.cost = own;
-        unit.blocks.assign(1, {item.first, item.last, bits, item.fit});
+      if (const uint64_t cost = block_cost(item.last - item.first, bits, endpoints);
+          item.merged && cost <= own.cost) {
+        own.cost = cost;
+        own.blocks = 1;
+        cheaper.push_back({item.first, item.last, bits, item.fit});
+      } else {
+        cheaper.insert(cheaper.end(), block, next);
       }
-      merged.push_back(std::move(unit));
-    }
-    units = std::move(merged);
+      block = next;
+      merged.push_back(own);
+    });
+    std::swap(units, merged);
+    std::swap(plan, cheaper);
   }
-  std::vector<PlannedBlock> plan;
-  for (const Unit& unit : units) plan.insert(plan.end(), unit.blocks.begin(), unit.blocks.end());
   return plan;
 }
 

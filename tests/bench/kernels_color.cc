@@ -63,7 +63,8 @@ struct Run {
 std::vector<Run> planned(const MacroColors& macro, bool weights) {
   const Fitter fitter(macro, Endpoints::rgb565, allowed, effort);
   std::vector<Run> runs;
-  for (const PlannedBlock& block : parse_optimally(macro, fitter, Endpoints::rgb565, effort))
+  PlanMemory memory;
+  for (const PlannedBlock& block : parse_optimally(macro, fitter, Endpoints::rgb565, effort, memory))
     if ((block.bits > 0) == weights) runs.push_back({block.first, block.last, block.bits});
   return runs;
 }

@@ -92,6 +92,7 @@ TEST(Blocks, FromEffort4OnNothingIsLargerThanGreedyMerging) {
 
 TEST(Blocks, ParsingIsCloseToTheBestCut) {
   uint64_t best = 0, found = 0, greedy = 0;
+  PlanMemory memory;
   for (uint64_t seed = 10; seed < 20; ++seed)
     for (const ColorCase& c : color_cases(80, seed)) {
       const MacroColors colors(c.colors);
@@ -103,11 +104,11 @@ TEST(Blocks, ParsingIsCloseToTheBestCut) {
       };
       std::vector<uint64_t> known(c.colors.size());
       const uint64_t least = cheapest_cut(colors, fitter, Endpoints::rgb565, 0, known);
-      const uint64_t own = cost_of(parse_optimally(colors, fitter, Endpoints::rgb565, 9));
+      const uint64_t own = cost_of(parse_optimally(colors, fitter, Endpoints::rgb565, 9, memory));
       EXPECT_GE(own, least);
       best += least;
       found += own;
-      greedy += cost_of(merge_greedily(colors, fitter, Endpoints::rgb565, 0, most_weight_bits));
+      greedy += cost_of(merge_greedily(colors, fitter, Endpoints::rgb565, 0, most_weight_bits, memory));
     }
   EXPECT_LT(static_cast<double>(found), 1.05 * static_cast<double>(best));
   EXPECT_LT(found, greedy);
@@ -218,6 +219,83 @@ TEST(Blocks, KernelsAgreeWithEachOtherAndWithThePlainWay) {
       }
     }
   }
+}
+
+TEST(Blocks, LinesAreTheFirstTryThatIsWithinTheThreshold) {
+  std::mt19937_64 random(5);
+  const auto byte = [&] { return static_cast<uint8_t>(random()); };
+  const auto floats = [](Rgb c) {
+    return std::array<float, 3>{static_cast<float>(c.r), static_cast<float>(c.g), static_cast<float>(c.b)};
+  };
+  int feasible = 0, later = 0;
+  for (int round = 0; round < 4000; ++round) {
+    // Along a line, with noise; often of few steps.
+    const Rgb a{byte(), byte(), byte()}, b = round % 16 == 0 ? a : Rgb{byte(), byte(), byte()};
+    const auto steps = static_cast<uint32_t>(1 + random() % (round % 2 == 0 ? 4 : 60));
+    std::vector<Rgb> colors(1 + random() % (round % 4 == 0 ? 400 : 20));
+    for (Rgb& c : colors) {
+      c = mix(a, b, static_cast<uint32_t>(random() % (steps + 1)), steps);
+      const auto shake = [&](uint8_t v) {
+        return static_cast<uint8_t>(std::clamp<int>(v + static_cast<int>(random() % 9) - 4, 0, 255));
+      };
+      c = {shake(c.r), shake(c.g), shake(c.b)};
+    }
+    const MacroColors macro(colors);
+    const ColorRun run{{macro.channel(0), macro.channel(1), macro.channel(2)}, macro.size()};
+    const BlockKernels &native = block_kernels(true), &plain = block_kernels(false);
+    const auto allowed = static_cast<uint32_t>(random() % 200);
+    const Distances single = plain.distances(run, floats(a), floats(a), 1, ~uint32_t{0} >> 8, nullptr);
+    EXPECT_EQ(native.within(run, floats(a), allowed), single.most <= allowed);
+    EXPECT_EQ(plain.within(run, floats(a), allowed), single.most <= allowed);
+
+    LineTries line{{0, 0, 0}, {0, 0, 0}, 0, round % 3 == 0 ? Endpoints::rgb888 : Endpoints::rgb565, 0};
+    line.tries = 1 + static_cast<int>(random() % 11);
+    float length = 0;
+    for (size_t c = 0; c < 3; ++c) {
+      line.mean[c] = (floats(a)[c] + floats(b)[c]) / 2;
+      line.axis[c] = floats(b)[c] - floats(a)[c];
+      length += line.axis[c] * line.axis[c];
+    }
+    for (size_t c = 0; c < 3; ++c) {
+      line.axis[c] /= std::max(std::sqrt(length), 1.0f);
+      line.center += line.mean[c] * line.axis[c];
+    }
+    const int bits = 1 + round % 4, most = (1 << bits) - 1;
+    const Extent extent = plain.extent(run, line.axis);
+    const float lo = extent.least - line.center, hi = extent.most - line.center,
+                half_cell = (hi - lo) / static_cast<float>(2 * (most + 1));
+    LineFit expected;
+    for (int i = 0; i < line.tries && !expected.feasible; ++i) {
+      const auto end = [&](float t) {
+        const auto stored = [&](size_t c, float top) {
+          const float v = line.mean[c] + t * line.axis[c];
+          return static_cast<uint32_t>(std::clamp(v, 0.0f, 255.0f) * (top / 255.0f) + 0.5f);
+        };
+        return line.endpoints == Endpoints::rgb888
+                   ? Rgb{static_cast<uint8_t>(stored(0, 255)), static_cast<uint8_t>(stored(1, 255)),
+                         static_cast<uint8_t>(stored(2, 255))}
+                   : Rgb{from_5_bits(stored(0, 31)), from_6_bits(stored(1, 63)), from_5_bits(stored(2, 31))};
+      };
+      const float* const inset = line_insets + 8 * (i / 4) + i % 4;
+      expected.a = end(lo + inset[0] * half_cell);
+      expected.b = end(hi + inset[4] * half_cell);
+      const Distances d =
+          plain.distances(run, floats(expected.a), floats(expected.b), most, ~uint32_t{0} >> 8, nullptr);
+      expected.feasible = d.most <= allowed;
+      expected.squared_error = d.sum;
+      later += expected.feasible && i > 0;
+    }
+    feasible += expected.feasible;
+    for (const LineFit& fit : {native.line(run, line, most, allowed), plain.line(run, line, most, allowed)}) {
+      ASSERT_EQ(fit.feasible, expected.feasible) << "round " << round;
+      if (!fit.feasible) continue;
+      EXPECT_EQ(fit.a, expected.a);
+      EXPECT_EQ(fit.b, expected.b);
+      EXPECT_EQ(fit.squared_error, expected.squared_error);
+    }
+  }
+  EXPECT_GT(feasible, 500);
+  EXPECT_GT(later, 50);
 }
 
 TEST(Blocks, DamagedPartsAreReadWithoutHarm) {
