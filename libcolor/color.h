@@ -34,7 +34,8 @@ Status validate(const Options& options);
 /// Compresses `source`, with the attributes that it has, into a container written to `sink`, in one pass.
 /// Memory: the DAG and some parts of colours; with Colors::all or along a Hilbert curve, all colours, twice;
 /// with palette, all colours; the same of attributes, but for palette. What is written does not depend on
-/// ctx.threads. Errors:
+/// ctx.threads. With Options::simplify also the DAG of what there was, until the distance to it is measured.
+/// Errors:
 /// - ErrorCode::usage: those of `validate`.
 /// - ErrorCode::limit: more than 2^32 - 1 different leaf words, or words of the nodes of a height; as many
 ///   colours with Counts::pointer; more memory than ctx.memory allows.

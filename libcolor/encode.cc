@@ -18,6 +18,8 @@
 #include "libcolor/layout.h"
 #include "libcolor/octree/octree_encode.h"
 #include "libcolor/part_codecs.h"
+#include "libcolor/simplify/hausdorff.h"
+#include "libcolor/simplify/simplified_surface.h"
 #include "libcolor/textures/astc.h"
 #include "libcolor/textures/image_codec.h"
 #include "libcolor/textures/texture.h"
@@ -216,6 +218,8 @@ Status validate(const Options& o) {
   for (const auto& threshold : o.attribute_thresholds)
     if (threshold && !(*threshold >= 0))
       return bad_usage(fmt::format("threshold {} of an attribute: expected 0 or more", *threshold));
+  if (!(o.simplify >= 0 && o.simplify <= most_simplify))
+    return bad_usage(fmt::format("simplify {}: expected 0 to {} voxels", o.simplify, most_simplify));
   VOX_CHECK(part_codec(o.codec).support(o));
   if (o.effort < 1 || o.effort > 9) return bad_usage(fmt::format("effort {}: expected 1 to 9", o.effort));
   return {};
@@ -240,17 +244,19 @@ Result<Report> encode(SurfaceSource& source, const Options& options, const Store
 
   ColorWriter colors(options, stored, container, ctx);
   VOX_CHECK(colors.begin());
-  const AttributeSet attributes = source.attributes();
+  DagBuilder builder(height, ctx), exact(height, ctx);
+  SimplifiedSurface simplified(source, options.simplify, [&](const VoxelRun& run) { return exact.add(run); });
+  SurfaceSource& wanted = options.simplify > 0 ? simplified : source;
+  const AttributeSet attributes = wanted.attributes();
   AttributeWriter values(attributes, options, container, ctx);
   VOX_CHECK(values.begin());
-  DagBuilder builder(height, ctx);
   const bool all = options.colors == Colors::all, reorder = all || options.curve != Curve::morton;
   // Until the nodes above, or the palette, are known.
   const bool hold = reorder || options.codec == ColorCodec::palette;
   std::vector<Rgb> held;
   std::vector<std::byte> held_values;
   Reservation reservation(*ctx.memory);
-  VOX_CHECK(source.read(ctx, [&](const VoxelRun& run) -> Status {
+  VOX_CHECK(wanted.read(ctx, [&](const VoxelRun& run) -> Status {
     if (run.attributes.size() != run.voxels.size() * attributes.bytes())
       return fail(ErrorCode::internal, {}, "a run of voxels without the attributes that its source has");
     VOX_CHECK(builder.add(run));
@@ -266,6 +272,13 @@ Result<Report> encode(SurfaceSource& source, const Options& options, const Store
     return {};
   }));
   VOX_TRY(Dag dag, builder.finish());
+  Report report;
+  Params& p = report.params;
+  if (options.simplify > 0) {
+    VOX_TRY(const Dag before, exact.finish());
+    p.simplify = options.simplify;
+    VOX_TRY(p.hausdorff, hausdorff_distance(view_of(before), view_of(dag), options.simplify, ctx));
+  }
   dag.curve = options.curve;
   Dag recounted;
   const bool other_counts = all || options.counts != Counts::node;
@@ -291,8 +304,6 @@ Result<Report> encode(SurfaceSource& source, const Options& options, const Store
   VOX_CHECK(values.add(held_values));
   VOX_CHECK(values.finish());
 
-  Report report;
-  Params& p = report.params;
   VOX_CHECK(write_geometry(dag, options, container, p, ctx));
   p.codec = options.codec;
   p.colors = options.colors;

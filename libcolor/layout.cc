@@ -52,6 +52,8 @@ std::vector<std::byte> pack_params(const Params& p) {
   store_le(&bytes[64], p.color_bytes);
   store_le(&bytes[72], p.macro_blocks);
   store_le(&bytes[80], p.blocks);
+  store_le(&bytes[96], p.simplify);
+  store_le(&bytes[104], p.hausdorff);
   return bytes;
 }
 
@@ -115,6 +117,8 @@ Result<Params> unpack_params(std::span<const std::byte> bytes, const VolumeInfo&
   p.color_bytes = number(64);
   p.macro_blocks = number(72);
   p.blocks = number(80);
+  p.simplify = load_le<double>(&bytes[96]);
+  p.hausdorff = load_le<double>(&bytes[104]);
   if (p.codec == ColorCodec::palette) {
     p.palette_colors = load_le<uint32_t>(&bytes[28]);
     if (p.palette_colors > most_palette_colors || (p.palette_colors == 0) != (p.color_count == 0))

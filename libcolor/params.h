@@ -113,6 +113,9 @@ constexpr bool makes_images(ColorCodec codec) {
 
 inline constexpr uint32_t most_palette_colors = 1 << 16;
 
+/// Greatest distance within which a surface may be simplified, in voxels.
+inline constexpr int most_simplify = 8;
+
 /// What an encoder is asked for.
 struct Options {
   ColorCodec codec = ColorCodec::vws;
@@ -135,6 +138,9 @@ struct Options {
   /// By attribute, of fws and vws: greatest error of a value; not said: emissive as colours, or 9.56; opacity
   /// 4; normal 3 degrees; rm 8.
   std::array<std::optional<double>, attribute_kinds.size()> attribute_thresholds{};
+  /// Fewer voxels: each that there was has one within that distance, in voxels, and the other way around; 0
+  /// to most_simplify (simplified_surface.h).
+  double simplify = 0;
   int zstd = 0;  ///< level of zstd for the file's chunks, 1 to 19; 0: as they are
 };
 
@@ -165,6 +171,8 @@ struct Params {
   uint64_t color_bytes = 0;  ///< of all parts
   uint64_t macro_blocks = 0, blocks = 0;
   AttributeSet attributes;  ///< beside colours
+  double simplify = 0;   ///< as was asked for
+  double hausdorff = 0;  ///< distance to what was there, as measured; in voxels, symmetric
 };
 
 }  // namespace voxkit::color

@@ -6,6 +6,7 @@
 #include "formats/output_file.h"
 #include "libcolor/compare.h"
 #include "libcolor/part_codecs.h"
+#include "libcolor/simplify/simplified_surface.h"
 #include "tools/common/color_report.h"
 #include "tools/common/encoding.h"
 #include "tools/common/surface_input.h"
@@ -95,6 +96,11 @@ void declare(CommandLine& line, Options& o) {
               "another level "
               "is said (access)",
               one_of(o.purpose, {"access", "storage"}));
+  line.option("--simplify", "D",
+              "Fewer voxels, for scans, where nothing repeats: each that there was has one within D voxels, "
+              "0 to 8, and the other way around (a Hausdorff distance, measured and reported). What is tight "
+              "stays so, gaps become wider (0)",
+              number(o.encoder.simplify, 0, color::most_simplify));
   line.file("--tiles", "PATTERN",
             "Of a .dagc file: take the colours from the images that vox-decode --tiles wrote of it, such as "
             "tile-%04d.png; where codec and ending agree they are stored as they are",
@@ -169,6 +175,7 @@ std::vector<std::string> printable(std::vector<std::string> notes) {
 Result<TiledSurface> open_what(const Options& o, const color::Options& options, Context& ctx) {
   if (!o.tiles.empty()) {
     if (o.surface.resolution) return bad_usage("--resolution: tiles are of voxels: leave it out");
+    if (o.encoder.simplify > 0) return bad_usage("--simplify: tiles are of voxels: leave it out");
     return open_tiled(o.input, o.tiles, options, ctx);
   }
   SurfaceOptions surface = o.surface;
@@ -206,7 +213,8 @@ Result<int> work(const Options& o, Run& run) {
     run.stage("verify");
     VOX_TRY(opened, open_what(o, options, run.ctx));
     VOX_TRY(const Input decoded, open_compressed(out->temporary(), 0, run.ctx));
-    VOX_TRY(diff, color::compare(*opened.source, *decoded.color, run.ctx));
+    color::SimplifiedSurface simplified(*opened.source, options.simplify);
+    VOX_TRY(diff, color::compare(simplified, *decoded.color, run.ctx));
     const double bound = color::has_threshold(p.codec) ? p.threshold : report.most_error;
     if (!diff->same_voxels || diff->max_distance > bound) {
       cli::report(run.tool,
@@ -223,8 +231,9 @@ Result<int> work(const Options& o, Run& run) {
   if (run.options.json) VOX_CHECK(print(json_of(encoding, run, report, o, notes, diff).text()));
   if (!run.options.quiet && !run.options.json)
     tell(fmt::format(
-        "{}: {} voxels in {} bytes: geometry {}, colors {} ({:.4g} %){}, error {:.4g}, in {:.2f} s{}",
+        "{}: {} voxels in {} bytes: geometry {}, colors {} ({:.4g} %){}{}, error {:.4g}, in {:.2f} s{}",
         o.output, p.leaf_voxels, encoding.file_bytes, p.dag_bytes, p.color_bytes, color_percent(p),
+        p.simplify > 0 ? fmt::format(", simplified: {:.4g} voxels off", p.hausdorff) : "",
         emits ? ", emission added" : "", p.grmse, encoding.seconds,
         diff ? fmt::format(", greatest error {:.4g}", diff->max_distance) : ""));
   return 0;

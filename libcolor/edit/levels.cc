@@ -41,6 +41,10 @@ class LevelSurface final : public SurfaceSource {
           fmt::format("its colors are lossy already ({}, error {:.4g} a channel): errors are "
                       "counted from what they decode to",
                       part_codec(params.codec).name, params.grmse));
+    if (params.simplify > 0)
+      notes_.push_back(
+          fmt::format("its voxels are simplified already ({:.4g} off): distances are counted from them",
+                      params.hausdorff));
   }
   Status read(Context& ctx, const Sink& sink) override { return level_.for_each_voxel(sink, ctx); }
 

@@ -33,7 +33,8 @@ libcolor/blocks   -> formats libcolor/surface libcolor/terms
 libcolor/palette  -> formats libcolor/surface libcolor/terms libcolor/blocks
 libcolor/attributes -> formats libcolor/surface libcolor/terms libcolor/dag libcolor/blocks libcolor/palette
 libcolor/textures -> formats formats/image libcolor/surface libcolor/terms libcolor/blocks
-libcolor          -> formats formats/image libcolor/surface libcolor/terms libcolor/dag libcolor/octree libcolor/blocks libcolor/palette libcolor/attributes libcolor/textures
+libcolor/simplify -> formats libcolor/surface libcolor/terms libcolor/dag
+libcolor          -> formats formats/image libcolor/surface libcolor/terms libcolor/dag libcolor/octree libcolor/blocks libcolor/palette libcolor/attributes libcolor/textures libcolor/simplify
 libcolor/edit     -> formats libcolor libcolor/surface libcolor/terms libcolor/dag
 libmetrics        -> formats formats/image
 librender         -> formats formats/image

@@ -113,7 +113,7 @@ class Tools(SurfaceCase):
                 data += bytes((noise.randrange(256), noise.randrange(256), noise.randrange(256), 255)
                               if noise.random() < share else 4)
             write(self.path("in.raw"), data)
-            for options in ((), ("-e", "1"), ("--colors", "all"), ("--codec", "bc1"), ("--codec", "palette"), ("--codec", "png"),
+            for options in ((), ("-e", "1"), ("--simplify", "2"), ("--colors", "all"), ("--codec", "bc1"), ("--codec", "palette"), ("--codec", "png"),
                             ("--codec", "palette", "--palette", "65536"),
                             ("--curve", "hilbert", "--colors", "all")):
                 with self.subTest(dims=dims, options=options):

@@ -38,6 +38,7 @@ Json params_json(const color::Params& p) {
   json.set("colors", p.colors == color::Colors::leaf ? "leaf" : "all");
   json.set("counts", p.counts == color::Counts::node ? "node" : "pointer");
   json.set("geometry", name(p.geometry));
+  if (p.simplify > 0) json.set("simplify", p.simplify);
   return json;
 }
 
@@ -45,6 +46,7 @@ void add_sizes(const color::Params& p, Json& json) {
   json.set("leaf_voxels", p.leaf_voxels).set("dag_nodes", p.dag_nodes).set("dag_bytes", p.dag_bytes);
   json.set("color_count", p.color_count).set("color_bytes", p.color_bytes);
   json.set("macro_blocks", p.macro_blocks).set("blocks", p.blocks);
+  if (p.simplify > 0) json.set("hausdorff_distance", p.hausdorff);
 }
 
 double color_percent(const color::Params& p) {
@@ -60,6 +62,8 @@ std::string sizes_text(const color::Params& p) {
                                               : "a DAG",
       p.dag_bytes,
       8 * static_cast<double>(p.dag_bytes) / static_cast<double>(std::max<uint64_t>(p.leaf_voxels, 1)));
+  if (p.simplify > 0)
+    text += fmt::format("simplified  within {:.6g} voxels: {:.6g} off\n", p.simplify, p.hausdorff);
   text += fmt::format("colors      {}, {} of {}, {} bytes ({:.4g} % of 24 bits), error {:.4g} a channel\n",
                       color::part_codec(p.codec).name, p.color_count,
                       p.colors == color::Colors::leaf ? "voxels" : "voxels and nodes", p.color_bytes,
