@@ -171,8 +171,8 @@ struct Params {
   uint64_t color_bytes = 0;  ///< of all parts
   uint64_t macro_blocks = 0, blocks = 0;
   AttributeSet attributes;  ///< beside colours
-  double simplify = 0;   ///< as was asked for
-  double hausdorff = 0;  ///< distance to what was there, as measured; in voxels, symmetric
+  double simplify = 0;      ///< as was asked for
+  double hausdorff = 0;     ///< distance to what was there, as measured; in voxels, symmetric
 };
 
 }  // namespace voxkit::color
