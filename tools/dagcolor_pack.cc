@@ -1,7 +1,9 @@
 // dagcolor-pack: a coloured surface as a DAG and an array of compressed colours.
-#include <fmt/core.h>
+#include <fmt/format.h>
 
 #include <algorithm>
+#include <glm/vec3.hpp>
+#include <map>
 
 #include "formats/output_file.h"
 #include "libcolor/compare.h"
@@ -16,7 +18,9 @@ namespace voxkit::cli {
 namespace {
 
 struct Options {
-  std::string input, output, tiles;
+  std::vector<std::string> names;
+  std::map<size_t, glm::dvec3> places;  ///< of inputs that are moved
+  std::string output, tiles;
   SurfaceOptions surface;
   std::string kind = "thin", codec = "vws", image_curve = "morton", curve = "morton", colors = "leaf",
               counts = "node", space = "srgb", emissive = "add", geometry = "auto", purpose = "access";
@@ -26,11 +30,21 @@ struct Options {
 };
 
 void declare(CommandLine& line, Options& o) {
-  line.argument("INPUT",
-                "Mesh (.obj .gltf .glb .ply .stl .3ds), points (.ply .pcd .las), model (.vox), RGBA or RGB "
-                "volume, built-in "
-                "(menger:5, terrain:N, terrain:N:box), or .dagc file",
-                o.input);
+  line.arguments(
+      "INPUT",
+      "Mesh (.obj .gltf .glb .ply .stl .3ds), points (.ply .pcd .las), model (.vox), RGBA or RGB "
+      "volume, built-in "
+      "(menger:5, terrain:N, terrain:N:box), or .dagc file. Several meshes or points become one surface: "
+      "what shares a voxel has their mean, as in one file",
+      o.names);
+  line.behind_arguments(
+      "--at", "X,Y,Z",
+      "Of the mesh or points named before it: moved by so much, in the unit of the file (0,0,0)",
+      [&o](size_t number, const std::string& text) -> Status {
+        VOX_TRY(const auto at, read_numbers(text, 3));
+        o.places[number] = {at[0], at[1], at[2]};
+        return {};
+      });
   line.file("-o,--output", "OUT", "Output (.dagc), or -", o.output, true);
   line.option(
       "--resolution", "N",
@@ -138,6 +152,11 @@ color::Options encoder_options(const Options& o) {
   return options;
 }
 
+/// The inputs, in words.
+std::string input_of(const Options& o) {
+  return fmt::format("{}", fmt::join(o.names, " "));
+}
+
 /// Of a side of the grid that was asked for.
 int64_t resolution_of(const VolumeInfo& info) {
   return std::max({info.dims.x, info.dims.y, info.dims.z});
@@ -154,6 +173,11 @@ Json json_of(const Encoding& encoding, const Run& run, const color::Report& repo
                                        static_cast<double>(std::max<uint64_t>(p.leaf_voxels, 1)));
   json.set("geometry_bytes", p.dag_bytes).set("grmse", p.grmse).set("max_distance", report.most_error);
   json.set("emissive", o.emissive);
+  if (o.names.size() > 1) {
+    Json inputs = Json::array();
+    for (const std::string& name : o.names) inputs.push(std::string_view(name));
+    json.set("inputs", std::move(inputs));
+  }
   Json list = Json::array();
   for (const std::string& note : notes) list.push(std::string_view(note));
   json.set("notes", std::move(list));
@@ -176,19 +200,27 @@ Result<TiledSurface> open_what(const Options& o, const color::Options& options, 
   if (!o.tiles.empty()) {
     if (o.surface.resolution) return bad_usage("--resolution: tiles are of voxels: leave it out");
     if (o.encoder.simplify > 0) return bad_usage("--simplify: tiles are of voxels: leave it out");
-    return open_tiled(o.input, o.tiles, options, ctx);
+    if (o.names.size() > 1 || !o.places.empty())
+      return bad_usage("--tiles: expected one .dagc file, and no --at");
+    return open_tiled(o.names.front(), o.tiles, options, ctx);
   }
   SurfaceOptions surface = o.surface;
   surface.emission = o.emissive == "add";
   surface.open.outputs = {o.output};
   surface.kind = o.kind == "thin" ? color::SurfaceKind::thin : color::SurfaceKind::conservative;
   TiledSurface opened;
-  VOX_TRY(opened.source, open_surface(o.input, surface, ctx));
+  std::vector<PlacedInput> inputs;
+  for (const std::string& name : o.names) {
+    const auto at = o.places.find(inputs.size());
+    inputs.push_back({name, at == o.places.end() ? std::nullopt : std::optional(at->second)});
+  }
+  VOX_TRY(opened.source, open_surfaces(inputs, surface, ctx));
   return opened;
 }
 
 Result<int> work(const Options& o, Run& run) {
-  VOX_CHECK(check_encoding(o.input, o.output, o.verify, run));
+  const std::string input = input_of(o);
+  for (const std::string& name : o.names) VOX_CHECK(check_encoding(name, o.output, o.verify, run));
   const color::Options options = encoder_options(o);
   VOX_CHECK(color::validate(options));
   run.stage("read");
@@ -204,9 +236,8 @@ Result<int> work(const Options& o, Run& run) {
                                           [&](auto bytes) { return out->write(bytes); }, run.ctx));
   const color::Params& p = report.params;
   if (p.leaf_voxels == 0)
-    return bad_input(o.input,
-                     "nothing is left of it: expected voxels that are not void, at least half opaque");
-  const Encoding encoding{o.input, o.output, info, out->position(), run.seconds() - start, {}};
+    return bad_input(input, "nothing is left of it: expected voxels that are not void, at least half opaque");
+  const Encoding encoding{input, o.output, info, out->position(), run.seconds() - start, {}};
 
   std::optional<color::SurfaceDiff> diff;
   if (o.verify) {
@@ -227,7 +258,8 @@ Result<int> work(const Options& o, Run& run) {
     }
   }
   VOX_CHECK(out->commit());
-  for (const std::string& note : notes) run.say(fmt::format("{}: {}", o.input, note));
+  for (const std::string& note : notes)
+    run.say(o.names.size() > 1 ? note : fmt::format("{}: {}", input, note));
   if (run.options.json) VOX_CHECK(print(json_of(encoding, run, report, o, notes, diff).text()));
   if (!run.options.quiet && !run.options.json)
     tell(fmt::format(
@@ -253,6 +285,7 @@ int main(int argc, char** argv) {
       "  dagcolor-pack model.nrrd -o model.dagc --threshold 6.38 --verify\n"
       "  dagcolor-pack model.nrrd -o model.dagc --codec raw\n"
       "  dagcolor-pack house.glb -o house.dagc --codec bc1 --image-curve hilbert\n"
+      "  dagcolor-pack house.glb tree.ply --at 12,0,-3.5 -o garden.dagc\n"
       "  dagcolor-pack house.dagc -o coarse.dagc --resolution 512\n"
       "  dagcolor-pack house.dagc --tiles tile-%04d.dds -o other.dagc --codec bc7\n",
       [&](CommandLine& line) { declare(line, options); }, [&](Run& run) { return work(options, run); });

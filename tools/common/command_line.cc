@@ -88,6 +88,11 @@ struct CommandLine::State {
   std::string examples;
   std::map<std::string, std::vector<std::string>> words;  ///< that options may have as values, by their names
   std::set<std::string> files;                            ///< options whose values name files
+  struct Behind {
+    CLI::Option* option;
+    std::function<Status(size_t, const std::string&)> store;
+  };
+  std::vector<Behind> behind;  ///< options of the argument before
 };
 
 CommandLine::CommandLine(const std::string& tool, const std::string& purpose, const std::string& examples)
@@ -143,6 +148,34 @@ void CommandLine::argument(const std::string& metavar, const std::string& help, 
 void CommandLine::arguments(const std::string& metavar, const std::string& help,
                             std::vector<std::string>& values) {
   state_->app.add_option(metavar, values, help)->required()->type_name("");
+}
+
+void CommandLine::behind_arguments(const std::string& name, const std::string& metavar,
+                                   const std::string& help,
+                                   std::function<Status(size_t, const std::string&)> store) {
+  CLI::Option* const option = state_->app.add_option(name)->expected(1);
+  option->description(help)->type_name(metavar)->multi_option_policy(CLI::MultiOptionPolicy::TakeAll);
+  state_->behind.push_back({option, std::move(store)});
+}
+
+/// Finds out behind which argument each of them came.
+Status CommandLine::store_behind_arguments() {
+  for (const auto& [option, store] : state_->behind) {
+    size_t arguments = 0, values = 0, last = 0;
+    for (const CLI::Option* parsed : state_->app.parse_order()) {
+      if (parsed->get_positional()) ++arguments;
+      if (parsed != option) continue;
+      const std::string value = option->results().at(values++);
+      const std::string shown = option->get_name() + ": ";
+      if (arguments == 0 || arguments == last)
+        return bad_usage(
+            fmt::format("{}\"{}\": expected it once, behind the input that it is of", shown, value));
+      last = arguments;
+      if (const Status status = store(arguments - 1, value); !status)
+        return bad_usage(shown + status.error().what);
+    }
+  }
+  return {};
 }
 
 void CommandLine::declare_common() {
@@ -232,6 +265,8 @@ Result<CommandLine::Outcome> CommandLine::parse(int argc, char** argv) {
     while (!what.empty() && (what.back() == '\n' || what.back() == ' ')) what.pop_back();
     return bad_usage(what + (what.find("expected") == what.npos ? ": see --help" : ""));
   }
+
+  VOX_CHECK(store_behind_arguments());
 
   CommonOptions options = state_->options;
   if (const char* threads = std::getenv("VOX_THREADS"); threads != nullptr && app.count("--threads") == 0) {

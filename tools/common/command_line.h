@@ -2,6 +2,7 @@
 #pragma once
 
 #include <cstdint>
+#include <functional>
 #include <memory>
 #include <optional>
 #include <string>
@@ -44,6 +45,10 @@ class CommandLine {
   void argument(const std::string& metavar, const std::string& help, std::string& value);
   /// One such argument, or more; the last of the calls.
   void arguments(const std::string& metavar, const std::string& help, std::vector<std::string>& values);
+  /// An option that may come after each of the `arguments`, and is of that one. `store` is called with the
+  /// argument's number, from 0, and the value; an argument has at most one.
+  void behind_arguments(const std::string& name, const std::string& metavar, const std::string& help,
+                        std::function<Status(size_t, const std::string&)> store);
 
   /// What to do after the arguments have been read: the work, or print a text and stop: help, version, or, of
   /// `--describe` alone, all of this as JSON, from which manual pages and completions are made
@@ -57,6 +62,7 @@ class CommandLine {
 
  private:
   void declare_common();
+  Status store_behind_arguments();
   std::string description() const;
 
   struct State;

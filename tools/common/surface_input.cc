@@ -4,7 +4,9 @@
 
 #include <algorithm>
 
+#include "formats/mesh/joined_points.h"
 #include "formats/mesh/mesh.h"
+#include "formats/mesh/mesh_join.h"
 #include "formats/mesh/point_cloud.h"
 #include "formats/volume/readers.h"
 #include "libcolor/edit/levels.h"
@@ -19,30 +21,72 @@ namespace {
 
 using Surface = Result<std::unique_ptr<color::SurfaceSource>>;
 
-/// What has no voxels before it is put into a grid.
-Surface voxelise(const std::string& name, const SurfaceOptions& options, Context& ctx) {
+color::VoxeliseOptions voxelise_options(const SurfaceOptions& options) {
   color::VoxeliseOptions voxelise;
   voxelise.kind = options.kind;
   voxelise.emission = options.emission;
   voxelise.resolution = options.resolution;
   voxelise.attributes = options.attributes;
-  const auto is_wanted = [&](color::Attribute a) { return options.attributes && options.attributes->has(a); };
+  return voxelise;
+}
+
+bool is_wanted(const SurfaceOptions& options, color::Attribute attribute) {
+  return options.attributes && options.attributes->has(attribute);
+}
+
+PointExtras point_extras(const SurfaceOptions& options) {
+  PointExtras extras;
+  extras.alpha = !options.attributes || is_wanted(options, color::Attribute::opacity);
+  extras.normals = is_wanted(options, color::Attribute::normal);
+  extras.rm = is_wanted(options, color::Attribute::rm);
+  extras.labels = is_wanted(options, color::Attribute::id);
+  return extras;
+}
+
+MeshOptions mesh_options(const SurfaceOptions& options) {
+  return {.allow_outside = options.open.allow_outside,
+          .normals = is_wanted(options, color::Attribute::normal),
+          .rm = is_wanted(options, color::Attribute::rm)};
+}
+
+/// What has no voxels before it is put into a grid.
+Surface voxelise(const std::string& name, const SurfaceOptions& options, Context& ctx) {
   if (is_points_name(name)) {
-    PointExtras extras;
-    extras.alpha = !options.attributes || is_wanted(color::Attribute::opacity);
-    extras.normals = is_wanted(color::Attribute::normal);
-    extras.rm = is_wanted(color::Attribute::rm);
-    extras.labels = is_wanted(color::Attribute::id);
-    VOX_TRY(auto points, open_points(name, extras));
+    VOX_TRY(auto points, open_points(name, point_extras(options)));
     if (points)
       return color::surface_of_points(
           std::move(points), options.resolution.value_or(color::default_resolution), ctx, options.attributes);
   }
-  VOX_TRY(Mesh mesh, read_mesh(name, ctx,
-                               {.allow_outside = options.open.allow_outside,
-                                .normals = is_wanted(color::Attribute::normal),
-                                .rm = is_wanted(color::Attribute::rm)}));
-  return color::make_surface(std::move(mesh), voxelise, ctx);
+  VOX_TRY(Mesh mesh, read_mesh(name, ctx, mesh_options(options)));
+  return color::make_surface(std::move(mesh), voxelise_options(options), ctx);
+}
+
+/// Errors without a file name this one.
+template <class T>
+Result<T> named(Result<T> made, const std::string& name) {
+  if (!made && made.error().file.empty()) return fail(made.error().code, name, made.error().what);
+  return made;
+}
+
+/// Points of all kinds, and meshes: these are what `meshes` of them are.
+Surface joined(std::vector<PlacedPoints> clouds, std::vector<Mesh> meshes, const SurfaceOptions& options,
+               Context& ctx) {
+  if (meshes.empty())
+    return color::surface_of_points(join_points(std::move(clouds)),
+                                    options.resolution.value_or(color::default_resolution), ctx,
+                                    options.attributes);
+  for (PlacedPoints& cloud : clouds) {
+    VOX_TRY(Mesh mesh, mesh_of_points(*cloud.points, ctx));
+    move_mesh(mesh, cloud.by);
+    for (std::string& note : mesh.notes) note = cloud.prefix + note;
+    meshes.push_back(std::move(mesh));
+    cloud.points.reset();
+  }
+  if (meshes.size() > 1) {
+    VOX_TRY(Mesh all, join_meshes(std::move(meshes), ctx));
+    return color::make_surface(std::move(all), voxelise_options(options), ctx);
+  }
+  return color::make_surface(std::move(meshes.front()), voxelise_options(options), ctx);
 }
 
 tl::unexpected<Error> has_voxels(const std::string& name) {
@@ -93,9 +137,52 @@ Surface open_any(const std::string& name, const SurfaceOptions& options, Context
 }  // namespace
 
 Surface open_surface(const std::string& name, const SurfaceOptions& options, Context& ctx) {
-  Surface surface = open_any(name, options, ctx);
-  if (!surface && surface.error().file.empty()) return fail(surface.error().code, name, surface.error().what);
-  return surface;
+  return named(open_any(name, options, ctx), name);
+}
+
+Surface open_surfaces(std::span<const PlacedInput> inputs, const SurfaceOptions& options, Context& ctx) {
+  const PlacedInput& first = inputs.front();
+  if (inputs.size() == 1 && !first.at) return open_surface(first.name, options, ctx);
+  for (const PlacedInput& input : inputs) {
+    if (is_mesh_name(input.name) || is_points_name(input.name)) continue;
+    return fail(ErrorCode::usage, input.name,
+                inputs.size() == 1
+                    ? "--at: moves a mesh or points: expected one of these"
+                    : "is no mesh and no points: expected these as several inputs (vox-convert "
+                      "--merge puts .dagc files together)");
+  }
+  if (options.frame)
+    return fail(ErrorCode::usage, first.name, "--frame: is no animated model: expected a .vox file");
+  std::vector<PlacedPoints> clouds;
+  std::vector<const PlacedInput*> meshes_of, clouds_of;
+  const auto prefix_of = [&](const PlacedInput& input) { return inputs.size() > 1 ? input.name + ": " : ""; };
+  const auto by = [](const PlacedInput& input) { return input.at.value_or(glm::dvec3(0)); };
+  for (const PlacedInput& input : inputs) {
+    if (is_points_name(input.name)) {
+      VOX_TRY(auto points, named(open_points(input.name, point_extras(options)), input.name));
+      if (points) {
+        clouds.push_back({std::move(points), by(input), prefix_of(input)});
+        clouds_of.push_back(&input);
+        continue;
+      }
+    }
+    meshes_of.push_back(&input);
+  }
+  if (!meshes_of.empty())  // points of meshes have places and colours: the rest is named as dropped
+    for (size_t i = 0; i < clouds.size(); ++i) {
+      VOX_TRY(clouds[i].points, named(open_points(clouds_of[i]->name), clouds_of[i]->name));
+    }
+  std::vector<Mesh> meshes;
+  for (const PlacedInput* input : meshes_of) {
+    VOX_TRY(Mesh mesh, named(read_mesh(input->name, ctx, mesh_options(options)), input->name));
+    move_mesh(mesh, by(*input));
+    if (mesh.grid && inputs.size() > 1)
+      mesh.notes.push_back("its own grid of voxels is dropped: there is one around all inputs");
+    for (std::string& note : mesh.notes) note = prefix_of(*input) + note;
+    meshes.push_back(std::move(mesh));
+  }
+  return named(joined(std::move(clouds), std::move(meshes), options, ctx),
+               inputs.size() == 1 ? first.name : "");
 }
 
 }  // namespace voxkit::cli

@@ -1,0 +1,42 @@
+#include "formats/mesh/joined_points.h"
+
+#include <utility>
+
+namespace voxkit {
+namespace {
+
+class JoinedPoints final : public PointCloud {
+ public:
+  explicit JoinedPoints(std::vector<PlacedPoints> clouds) : clouds_(std::move(clouds)) {
+    for (const PlacedPoints& cloud : clouds_) {
+      size_ += cloud.points->size();
+      const PointExtras& has = cloud.points->has();
+      has_.alpha |= has.alpha;
+      has_.normals |= has.normals;
+      has_.rm |= has.rm;
+      has_.labels |= has.labels;
+      for (const std::string& note : cloud.points->notes()) notes_.push_back(cloud.prefix + note);
+    }
+  }
+  Status read(const Sink& sink) const override {
+    std::vector<CloudPoint> moved;
+    for (const PlacedPoints& cloud : clouds_)
+      VOX_CHECK(cloud.points->read([&](std::span<const CloudPoint> run) -> Status {
+        moved.assign(run.begin(), run.end());
+        for (CloudPoint& point : moved) point.at += cloud.by;
+        return sink(moved);
+      }));
+    return {};
+  }
+
+ private:
+  std::vector<PlacedPoints> clouds_;
+};
+
+}  // namespace
+
+std::unique_ptr<const PointCloud> join_points(std::vector<PlacedPoints> clouds) {
+  return std::make_unique<JoinedPoints>(std::move(clouds));
+}
+
+}  // namespace voxkit
