@@ -5,20 +5,23 @@
 #include <vector>
 
 #include "formats/reservation.h"
+#include "libcolor/surface/attributes.h"
 #include "librender/pixel.h"
 
 namespace voxkit::render {
 
 /// What a frame is to hold.
 struct FrameJob {
-  int width = 0, height = 0;  ///< rays, 1 and more
-  bool details = false;       ///< a PixelDetail for each
-  bool costs = false;         ///< a PixelCost for each
+  int width = 0, height = 0;        ///< rays, 1 and more
+  bool details = false;             ///< a PixelDetail for each
+  bool costs = false;               ///< a PixelCost for each
+  color::AttributeSet traits = {};  ///< if any, a PixelTraits for each
 
   uint64_t rays() const { return static_cast<uint64_t>(width) * static_cast<uint64_t>(height); }
   /// Of memory.
   uint64_t bytes() const {
-    return rays() * (sizeof(Pixel) + (details ? sizeof(PixelDetail) : 0) + (costs ? sizeof(PixelCost) : 0));
+    return rays() * (sizeof(Pixel) + (details ? sizeof(PixelDetail) : 0) + (costs ? sizeof(PixelCost) : 0) +
+                     (traits.empty() ? 0 : sizeof(PixelTraits)));
   }
 };
 
@@ -43,11 +46,16 @@ struct Frame : FrameCounts {
   std::vector<Pixel> pixels;
   std::vector<PixelDetail> details;  ///< as many, or none
   std::vector<PixelCost> costs;      ///< as many, or none
+  std::vector<PixelTraits> traits;   ///< as many, or none
+  color::AttributeSet has;           ///< what of them is known
 
   /// Gives the frame the size of `job` and what that wants, all counts but `rays` being 0; what pixels hold
   /// is left to whoever draws. What the frame has of memory counts against ctx.memory, which must outlive it.
   /// Errors: ErrorCode::limit; then it holds nothing.
   Status begin(const FrameJob& job, const Context& ctx);
+  /// Room for the traits of all pixels, of which these become known; none of no attributes. Errors:
+  /// ErrorCode::limit.
+  Status begin_traits(color::AttributeSet attributes, const Context& ctx);
 
  private:
   Reservation held_;

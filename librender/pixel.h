@@ -17,6 +17,14 @@ struct PixelDetail {
   int32_t voxel[3] = {-1, -1, -1};  ///< the first that is not void; of a coarser cell the one entered
   uint32_t cells = 0;               ///< cells looked at
 };
+/// What the first voxel that is not void has beside its colour, as far as it is known.
+struct PixelTraits {
+  float emissive[3] = {};  ///< light, as a display shows it; of all that the ray came through, times opacity
+  float opacity = 0;
+  float normal[3] = {};  ///< a unit vector in the world; 0: there is none
+  float rm[2] = {};      ///< roughness and metalness, 0..1
+  uint32_t id = 0;
+};
 /// What it cost, beside its cells: blocks entered, bytes of links and values looked at.
 struct PixelCost {
   uint32_t blocks, bytes;

@@ -10,6 +10,7 @@
 #include "librender/light.h"
 #include "librender/normals.h"
 #include "librender/occlusion.h"
+#include "librender/stored.h"
 #include "librender/surface.h"
 
 namespace voxkit::render {
@@ -69,12 +70,14 @@ Result<Picture> shade(const Frame& frame, const Camera& camera, double voxel, co
   VOX_TRY(const Surface surface, Surface::create(frame, camera, voxel, ctx));
   std::optional<Image> normals, openness;
   if (options.phong || options.ssao || options.normals) {
-    VOX_TRY(normals, find_normals(surface, ctx));
+    VOX_TRY(normals, frame.has.has(color::Attribute::normal) ? stored_normals(frame, surface, ctx)
+                                                             : find_normals(surface, ctx));
   }
   if (options.ssao) {
     VOX_TRY(openness, find_openness(surface, *normals, ctx));
   }
   const vec3 light = light_of(surface.rays());
+  const bool glows = frame.has.has(color::Attribute::emissive) && (options.phong || options.ssao);
   VOX_TRY(Image picture, Image::create(frame.width, frame.height, 4, SampleType::f32, ctx));
   VOX_CHECK(parallel_for(ctx, frame.height, [&](int64_t row) -> Status {
     const int y = static_cast<int>(row);
@@ -90,10 +93,15 @@ Result<Picture> shade(const Frame& frame, const Camera& camera, double voxel, co
       }
       if (openness) diffuse *= openness->row(y)[x];
       float* out = picture.row(y) + 4 * x;
-      for (int k = 0; k < 3; ++k)
-        out[k] = std::clamp(pixel.color[k] * diffuse + specular * pixel.color[3] +
-                                (1 - pixel.color[3]) * options.background[k],
-                            0.0f, 1.0f);
+      const float* const glow = glows ? frame.traits[surface.index(x, y)].emissive : nullptr;
+      for (int k = 0; k < 3; ++k) {
+        const bool lights = glow && glow[k] > 0;
+        const float body = lights ? without_light(pixel.color[k], glow[k]) : pixel.color[k];
+        const float lit = std::clamp(
+            body * diffuse + specular * pixel.color[3] + (1 - pixel.color[3]) * options.background[k], 0.0f,
+            1.0f);
+        out[k] = lights ? with_light(lit, glow[k]) : lit;
+      }
       out[3] = 1;
     }
     return {};

@@ -30,7 +30,11 @@ Status parse_layers(const std::string& text, std::vector<Layer>& layers) {
   const std::pair<std::string_view, Layer> names[] = {{"depth", Layer::depth},
                                                       {"normal", Layer::normal},
                                                       {"position", Layer::position},
-                                                      {"steps", Layer::steps}};
+                                                      {"steps", Layer::steps},
+                                                      {"emissive", Layer::emissive},
+                                                      {"opacity", Layer::opacity},
+                                                      {"rm", Layer::rm},
+                                                      {"id", Layer::id}};
   layers.clear();
   for (size_t at = 0; at <= text.size();) {
     const size_t comma = std::min(text.find(',', at), text.size());
@@ -38,8 +42,10 @@ Status parse_layers(const std::string& text, std::vector<Layer>& layers) {
       return name.first == std::string_view(text).substr(at, comma - at);
     });
     if (found == std::end(names) || std::find(layers.begin(), layers.end(), found->second) != layers.end())
-      return bad_usage(fmt::format(
-          "\"{}\": expected some of depth, normal, position and steps, with commas between them", text));
+      return bad_usage(
+          fmt::format("\"{}\": expected some of depth, normal, position, steps, emissive, opacity, rm and "
+                      "id, with commas between them",
+                      text));
     layers.push_back(found->second);
     at = comma + 1;
   }
@@ -94,8 +100,8 @@ void declare(CommandLine& line, RenderOptions& o) {
               [&o](const std::string& text) { return parse_antialias(text, o); });
   line.option(
       "--aov", "LAYERS",
-      "Further layers of an .exr, as floats: some of depth,normal,position,steps; with ssaa:N those of "
-      "the ray at the pixel's centre",
+      "Further layers of an .exr, as floats: some of depth,normal,position,steps, and of surfaces that have "
+      "them emissive,opacity,rm,id; with ssaa:N those of the ray at the pixel's centre",
       [&o](const std::string& text) { return parse_layers(text, o.layers); });
   line.option("--lod", "on|off", "Stop at voxels as small as a pixel (off)", one_of(o.lod, {"on", "off"}));
   line.option(

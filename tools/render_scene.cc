@@ -3,6 +3,7 @@
 #include <fmt/core.h>
 
 #include "formats/copy.h"
+#include "librender/cast/surface_traits.h"
 #include "tools/common/input.h"
 
 namespace voxkit::cli {
@@ -40,6 +41,20 @@ Result<std::shared_ptr<const DvrVolume>> open_volume(Input& input, bool device, 
   return std::make_shared<const DvrVolume>(std::move(volume));
 }
 
+/// That a surface, or what is none, has the attributes that layers need.
+Status check_needs(const color::AttributeSet has, const std::string& name, color::AttributeSet needs) {
+  std::string all = "depth, normal, position, steps";
+  for (size_t i = 0; i < color::attribute_kinds.size(); ++i)
+    if (const auto a = static_cast<color::Attribute>(i); has.has(a) && a != color::Attribute::normal)
+      all += fmt::format(", {}", color::kind_of(a).name);
+  for (size_t i = 0; i < color::attribute_kinds.size(); ++i)
+    if (const auto a = static_cast<color::Attribute>(i); needs.has(a) && !has.has(a))
+      return fail(ErrorCode::usage, name,
+                  fmt::format("--aov {}: it has no such attribute: expected some of {}",
+                              color::kind_of(a).name, all));
+  return {};
+}
+
 }  // namespace
 
 Status Scene::classify(const TransferFunction& transfer, const SceneOptions& options, Run& run) {
@@ -52,6 +67,7 @@ Status Scene::classify(const TransferFunction& transfer, const SceneOptions& opt
 }
 
 FrameJob Scene::job(FrameJob wanted) const {
+  wanted.traits = dag ? traits_of(dag->volume(), wanted.traits) : color::AttributeSet();
   wanted.details |= dag || masks || device || device_dvr;  // where to look colours up, what was hit
   wanted.costs = device || device_dvr;
   return wanted;
@@ -72,6 +88,8 @@ Status Scene::draw(const Camera& camera, CastOptions options, const DvrOptions& 
 
 Result<Scene> open_scene(const std::string& name, const SceneOptions& o, Run& run) {
   VOX_TRY(Input input, open_input(name, o.open, run.ctx));
+  VOX_CHECK(
+      check_needs(input.color ? input.color->params().attributes : color::AttributeSet(), name, o.needs));
   Scene scene;
   scene.info = input.source->info();
   if (o.dvr) {

@@ -18,6 +18,7 @@ struct SceneOptions {
   OpenOptions open;
   std::optional<ValueRange> range;  ///< sample values
   bool dvr = false;
+  color::AttributeSet needs = {};                  ///< of surfaces, for layers
   bool level_of_detail = false;                    ///< as CastOptions
   std::shared_ptr<const render::Backend> backend;  ///< that draws; null: this machine, its own way
 };

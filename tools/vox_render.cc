@@ -163,8 +163,18 @@ FrameOptions options_of(const RenderOptions& o, const Plan& plan) {
   options.scene.level_of_detail = options.cast.level_of_detail;
   options.scene.backend = plan.backend;
   options.shade.phong = phong && !options.scene.dvr;  // there every sample is lit by itself
+  for (const Layer layer : o.layers)
+    if (const auto attribute = attribute_of(layer)) {
+      cast.traits.add(*attribute);
+      // Normals are found where there are none.
+      if (layer != Layer::normal) options.scene.needs.add(*attribute);
+    }
   options.shade.ssao = o.shade.find("ssao") != std::string::npos;
   options.shade.depth_antialias = o.depth_antialias;
+  if (options.shade.phong || options.shade.ssao) {
+    cast.traits.add(color::Attribute::emissive);
+    cast.traits.add(color::Attribute::normal);
+  }
   return options;
 }
 
@@ -338,10 +348,11 @@ Result<int> work(const RenderOptions& o, Run& run) {
   VOX_TRY(const Plan plan, check(o, run));
   const FrameOptions options = options_of(o, plan);
   Drawn drawn;
-  const FrameJob least{options.cast.width, options.cast.height, options.cast.details};
+  FrameJob least{options.cast.width, options.cast.height, options.cast.details};
   VOX_TRY(Reservation held, hold_frames(o, plan, least, least, run.ctx));
   VOX_CHECK(open(o, options.scene, drawn, run));
   held = {};
+  least.traits = options.cast.traits;
   const FrameJob frame = drawn.scene.job(least), expected = drawn.other ? drawn.other->job(least) : least;
   VOX_TRY(held, hold_frames(o, plan, frame, expected, run.ctx));
   held = {};

@@ -1,7 +1,9 @@
 // Casting compressed surfaces, from their files: the DAG first, then the colours of what was hit.
 #include "libcolor/store.h"
 #include "librender/cast/cast_tile.h"
+#include "librender/cast/cast_translucent.h"
 #include "librender/cast/surface_colors.h"
+#include "librender/cast/surface_traits.h"
 
 namespace voxkit::render {
 
@@ -16,6 +18,11 @@ Status cast(const DagGrid& grid, const Camera& camera, const CastOptions& option
   VOX_TRY(const CastParams params, cast_params(grid.info(), camera, options));
   CastOptions detailed = options;
   detailed.details = true;  // where to look colours up
+  if (volume.params().attributes.has(color::Attribute::opacity)) {
+    VOX_CHECK(cast_translucent(volume, *dag, params, detailed, frame, ctx));
+    if (!options.details) frame.details.clear();
+    return {};
+  }
   if (options.traversal == Traversal::restart) {
     VOX_CHECK(cast_with(DagCastView<Search::restart>{dag}, params, detailed, frame, ctx));
   } else if (params.cone > 0 || !options.skip) {
@@ -25,6 +32,7 @@ Status cast(const DagGrid& grid, const Camera& camera, const CastOptions& option
     const BoxedView<DagSpace> boxed{{{dag}}, &params, memo.get(), least_log2(grid.info(), camera, options)};
     VOX_CHECK(cast_with(boxed, params, detailed, frame, ctx));
   }
+  VOX_CHECK(look_up_traits(volume, options.traits, true, frame, ctx));
   VOX_CHECK(look_up_colors(volume, frame, ctx));
   if (!options.details) frame.details.clear();
   return {};

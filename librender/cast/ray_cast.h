@@ -19,10 +19,11 @@ enum class Traversal { path, restart, baseline };
 struct CastOptions {
   int width = 1024, height = 768;
   Traversal traversal = Traversal::path;
-  bool level_of_detail = false;  ///< stop at voxels no larger than a pixel's cone (section 3.2.4)
-  bool native = true;            ///< AVX2 where there is; else what every machine has. For comparisons
-  bool details = false;          ///< fill Frame::details
-  bool skip = true;              ///< step over cells; else voxel by voxel, to see what skipping saves
+  bool level_of_detail = false;     ///< stop at voxels no larger than a pixel's cone (section 3.2.4)
+  bool native = true;               ///< AVX2 where there is; else what every machine has. For comparisons
+  bool details = false;             ///< fill Frame::details
+  color::AttributeSet traits = {};  ///< fill Frame::traits with those of them that a surface has
+  bool skip = true;                 ///< step over cells; else voxel by voxel, to see what skipping saves
   /// Stored values that a scalar volume shows as 0 and 1, its colour being (d, d, d, d) (section 4.1).
   ValueRange range{0, 255};
 };

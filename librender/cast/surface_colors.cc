@@ -32,8 +32,9 @@ Status look_up_colors(const color::Volume& volume, Frame& frame, Context& ctx) {
     }
     return {};
   }));
-  frame.lookup_seconds = seconds_since(start);
-  frame.seconds += frame.lookup_seconds;
+  const double seconds = seconds_since(start);
+  frame.lookup_seconds += seconds;
+  frame.seconds += seconds;
   return volume.store().status();
 }
 

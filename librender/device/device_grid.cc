@@ -5,6 +5,7 @@
 #include "libcolor/store.h"
 #include "librender/cast/cast_params.h"
 #include "librender/cast/surface_colors.h"
+#include "librender/cast/surface_traits.h"
 #include "librender/device/backend_run.h"
 #include "librender/device/flat_pools.h"
 #include "librender/device/frame_buffers.h"
@@ -100,6 +101,9 @@ class Dag final : public Grid {
       : Grid(grid.info(), std::move(backend)), grid_(grid) {}
   Status fill(Context& ctx) {
     const color::Volume& volume = grid_.volume();
+    if (volume.params().attributes.has(color::Attribute::opacity))
+      return fail(ErrorCode::device, volume.container().name(),
+                  "some of its voxels are translucent, which a GPU does not draw: expected --device cpu");
     VOX_TRY(const color::DagView* const dag, volume.store().dag(volume.container(), volume.params()));
     color::DagView view = *dag;
     VOX_TRY(leaves_, backend().upload(std::span(dag->leaves, dag->leaf_count), "leaves", ctx));
@@ -120,6 +124,7 @@ class Dag final : public Grid {
     VOX_CHECK(options.traversal == Traversal::restart
                   ? cast_with(DagCastView<Search::restart>{view_.data()}, camera, options, frame, ctx)
                   : cast_with(DagCastView<Search::path>{view_.data()}, camera, options, frame, ctx));
+    VOX_CHECK(look_up_traits(grid_.volume(), options.traits, true, frame, ctx));
     VOX_CHECK(look_up_colors(grid_.volume(), frame, ctx));
     if (!options.details) frame.details.clear();
     return {};

@@ -37,7 +37,7 @@ libcolor/simplify -> formats libcolor/surface libcolor/terms libcolor/dag
 libcolor          -> formats formats/image libcolor/surface libcolor/terms libcolor/dag libcolor/octree libcolor/blocks libcolor/palette libcolor/attributes libcolor/textures libcolor/simplify
 libcolor/edit     -> formats libcolor libcolor/surface libcolor/terms libcolor/dag
 libmetrics        -> formats formats/image
-librender         -> formats formats/image
+librender         -> formats formats/image libcolor/surface
 librender/cast    -> formats librender libsvmm libsvmm/packed libcolor libcolor/dag libcolor/attributes libcolor/surface
 librender/dvr     -> formats librender librender/cast libsvmm libsvmm/packed libvq
 librender/device  -> formats librender librender/cast librender/dvr libsvmm libvq libcolor libcolor/dag
