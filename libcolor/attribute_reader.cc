@@ -80,12 +80,12 @@ void AttributeReader::damaged(const std::string& what) const {
   store_->report(*container_, fmt::format("chunk ATTR {}.{}: {}", static_cast<int>(attribute_), part_, what));
 }
 
-AttributesReader::AttributesReader(const Store& store, const Container& container, const Params& params) {
-  for (const AttributeParams& own : store.attributes().params()) {
-    set_.add(own.attribute);
-    columns_.push_back(
-        {kind_of(own.attribute).bytes, AttributeReader(store, container, params, own.attribute)});
-  }
+AttributesReader::AttributesReader(const Store& store, const Container& container, const Params& params,
+                                   AttributeSet set) {
+  for (const AttributeParams& own : store.attributes().params())
+    if (set.has(own.attribute))
+      columns_.push_back(
+          {kind_of(own.attribute).bytes, AttributeReader(store, container, params, own.attribute)});
 }
 
 }  // namespace voxkit::color

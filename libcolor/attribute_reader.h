@@ -55,11 +55,13 @@ class AttributeReader {
   AttributePartReader reader_;
 };
 
-/// All that a file has of a voxel.
+/// All that a file has of a voxel, or some of it.
 class AttributesReader {
  public:
-  AttributesReader(const Store& store, const Container& container, const Params& params);
-  AttributeSet set() const { return set_; }
+  AttributesReader(const Store& store, const Container& container, const Params& params)
+      : AttributesReader(store, container, params, params.attributes) {}
+  /// `set`: of those that the file has.
+  AttributesReader(const Store& store, const Container& container, const Params& params, AttributeSet set);
   /// Appends them, by number.
   void append(uint64_t index, std::vector<std::byte>& out) {
     for (Column& column : columns_) {
@@ -73,7 +75,6 @@ class AttributesReader {
     size_t bytes;
     AttributeReader reader;
   };
-  AttributeSet set_;
   std::vector<Column> columns_;
 };
 

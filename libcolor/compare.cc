@@ -20,8 +20,8 @@ class Attributes {
  public:
   Attributes(AttributeSet set, const Volume& volume, SurfaceDiff& diff) : set_(set), diff_(diff) {
     diff.same_attributes = set == volume.params().attributes;
-    if (!diff.same_attributes) return;
     for (const AttributeParams& params : volume.attributes()) {
+      if (!set.has(params.attribute)) continue;
       diff.attributes.push_back({params.attribute, 0, 0});
       columns_.push_back(
           {params, AttributeReader(volume.store(), volume.container(), volume.params(), params.attribute)});

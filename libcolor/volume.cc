@@ -73,6 +73,7 @@ Result<std::shared_ptr<const Volume>> Volume::recolored(PartColors colors, uint6
   volume->container_ = container_;
   volume->info_ = info_;
   volume->params_ = params_;
+  volume->params_.grmse = 0;  // of other colours
   volume->store_ = std::make_unique<Store>(memory, store_->threads());
   VOX_CHECK(volume->store_->find_chunks(*container_, params_));
   volume->store_->decode_parts(std::move(colors), work_bytes);

@@ -10,6 +10,7 @@
 #include "libcolor/edit/exact.h"
 #include "libcolor/edit/lattice.h"
 #include "libcolor/part_codecs.h"
+#include "tools/common/attributes.h"
 #include "tools/common/color_report.h"
 #include "tools/common/input.h"
 #include "tools/common/json.h"
@@ -85,10 +86,24 @@ std::string told_of_losses(const SurfaceEdit& edit, const Volumes& volumes) {
       names, most);
 }
 
+/// Those that some inputs have and others do not.
+std::string attributes_not_common(const Volumes& volumes) {
+  color::AttributeSet lost;
+  for (const auto& a : volumes)
+    for (const auto& b : volumes) {
+      const color::AttributeSet own = without(a->params().attributes, b->params().attributes);
+      for (size_t i = 0; i < color::attribute_kinds.size(); ++i)
+        if (own.has(static_cast<color::Attribute>(i))) lost.add(static_cast<color::Attribute>(i));
+    }
+  return names_of(lost);
+}
+
 void tell_what_was_done(const SurfaceEdit& edit, const Volumes& volumes, const color::CommonGrid& grid,
                         const color::Arrangement::Census& census, uint64_t dropped, Run& run) {
   for (const std::string& note : grid.notes) run.say(note);
   if (const std::string losses = told_of_losses(edit, volumes); !losses.empty()) run.say(losses);
+  if (const std::string lost = attributes_not_common(volumes); !lost.empty())
+    run.say(fmt::format("{}: dropped: {}, which not all inputs have", edit.output, lost));
   if (dropped > 0) run.say(fmt::format("{}: dropped: {} voxels that leave the grid", edit.output, dropped));
   if (census.shared > 0)
     run.say(
@@ -99,7 +114,8 @@ void tell_what_was_done(const SurfaceEdit& edit, const Volumes& volumes, const c
 }
 
 Json json_of(const SurfaceEdit& edit, const VolumeInfo& info, const color::Params& params,
-             const color::Arrangement::Census& census, uint64_t dropped, const Run& run) {
+             std::span<const color::AttributeParams> attributes, const color::Arrangement::Census& census,
+             uint64_t dropped, const Run& run) {
   Json inputs = Json::array(), json = Json::result();
   for (const std::string& input : edit.inputs) inputs.push(std::string_view(input));
   json.set("tool", run.tool).set("version", version_text());
@@ -108,6 +124,7 @@ Json json_of(const SurfaceEdit& edit, const VolumeInfo& info, const color::Param
   if (const auto bytes = file_bytes(edit.output)) json.set("file_bytes", *bytes);
   json.set("params", params_json(params));
   add_sizes(params, json);
+  if (!attributes.empty()) json.set("attributes", attributes_json(attributes, params.leaf_voxels));
   json.set("shared_voxels", census.shared).set("differing_voxels", census.differing);
   json.set("dropped_voxels", dropped).set("cells_visited", census.cells);
   json.set("seconds", run.seconds())
@@ -146,7 +163,8 @@ Result<int> convert_surfaces(const SurfaceEdit& edit, Run& run) {
   VOX_TRY(const color::Report report,
           color::encode(
               arrangement, options, [&](auto bytes) { return out->write(bytes); }, run.ctx));
-  if (report.most_error > 0)
+  if (report.most_error > 0 ||
+      std::ranges::any_of(report.attributes, [](const auto& p) { return p.most_error > 0; }))
     return fail(ErrorCode::internal, edit.output, "colors did not stay what they were: nothing was written");
   VOX_CHECK(out->commit());
 
@@ -157,7 +175,7 @@ Result<int> convert_surfaces(const SurfaceEdit& edit, Run& run) {
                        color::part_codec(report.params.codec).name, color_percent(report.params),
                        census.cells, run.seconds()));
   if (run.options.json)
-    VOX_CHECK(print(json_of(edit, grid.info, report.params, census, dropped, run).text()));
+    VOX_CHECK(print(json_of(edit, grid.info, report.params, report.attributes, census, dropped, run).text()));
   return 0;
 }
 

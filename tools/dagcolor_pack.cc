@@ -9,6 +9,7 @@
 #include "libcolor/compare.h"
 #include "libcolor/part_codecs.h"
 #include "libcolor/simplify/simplified_surface.h"
+#include "tools/common/attributes.h"
 #include "tools/common/color_report.h"
 #include "tools/common/encoding.h"
 #include "tools/common/surface_input.h"
@@ -26,6 +27,7 @@ struct Options {
               counts = "node", space = "srgb", emissive = "add", geometry = "auto", purpose = "access";
   color::Options encoder;
   std::optional<uint32_t> palette;
+  std::optional<color::AttributeSet> attributes;
   bool verify = false;
 };
 
@@ -56,6 +58,17 @@ void declare(CommandLine& line, Options& o) {
               one_of(o.kind, {"thin", "conservative"}));
   line.option("--emissive", "HOW", "Of a mesh: light that it emits: add: to its colors; drop (add)",
               one_of(o.emissive, {"add", "drop"}));
+  line.option(
+      "--attributes", "LIST",
+      "What voxels have: color, and any of emissive, opacity, normal, rm (roughness and metalness) and "
+      "id (of material or label), such as color,opacity,id (color, and what the input has of emissive and "
+      "opacity; of a .dagc file all that it has)",
+      attribute_list(o.attributes));
+  line.option(
+      "--attribute-threshold", "LIST",
+      "Of attributes in blocks: greatest errors, such as emissive=9,opacity=2,normal=1,rm=4; normal in "
+      "degrees (emissive: as colors; opacity=4,normal=3,rm=8)",
+      attribute_thresholds(o.encoder.attribute_thresholds));
   line.option("--frame", "N", "Of an animated .vox model: which frame, from 0 (0)",
               integer(o.surface.frame, 0, uint32_t{1} << 31));
   line.option("--codec", "CODEC",
@@ -168,6 +181,7 @@ Json json_of(const Encoding& encoding, const Run& run, const color::Report& repo
   Json json = encoding_json(encoding, run, params_json(p));
   json.set("resolution", resolution_of(encoding.info));
   add_sizes(p, json);
+  if (!report.attributes.empty()) json.set("attributes", attributes_json(report.attributes, p.leaf_voxels));
   json.set("color_percent", color_percent(p));
   json.set("color_bits_per_voxel", 8 * static_cast<double>(p.color_bytes) /
                                        static_cast<double>(std::max<uint64_t>(p.leaf_voxels, 1)));
@@ -202,10 +216,13 @@ Result<TiledSurface> open_what(const Options& o, const color::Options& options, 
     if (o.encoder.simplify > 0) return bad_usage("--simplify: tiles are of voxels: leave it out");
     if (o.names.size() > 1 || !o.places.empty())
       return bad_usage("--tiles: expected one .dagc file, and no --at");
-    return open_tiled(o.names.front(), o.tiles, options, ctx);
+    VOX_TRY(TiledSurface tiled, open_tiled(o.names.front(), o.tiles, options, ctx));
+    VOX_TRY(tiled.source, with_wanted(std::move(tiled.source), o.attributes, o.names.front()));
+    return tiled;
   }
   SurfaceOptions surface = o.surface;
   surface.emission = o.emissive == "add";
+  surface.attributes = o.attributes;
   surface.open.outputs = {o.output};
   surface.kind = o.kind == "thin" ? color::SurfaceKind::thin : color::SurfaceKind::conservative;
   TiledSurface opened;
@@ -247,6 +264,12 @@ Result<int> work(const Options& o, Run& run) {
     color::SimplifiedSurface simplified(*opened.source, options.simplify);
     VOX_TRY(diff, color::compare(simplified, *decoded.color, run.ctx));
     const double bound = color::has_threshold(p.codec) ? p.threshold : report.most_error;
+    const std::string broken = broken_attributes(*diff, report.attributes);
+    if (!broken.empty()) {
+      cli::report(run.tool, {ErrorCode::internal, o.output,
+                             fmt::format("verification failed: {}; nothing was written", broken)});
+      return 1;
+    }
     if (!diff->same_voxels || diff->max_distance > bound) {
       cli::report(run.tool,
                   {ErrorCode::internal, o.output,
@@ -263,8 +286,9 @@ Result<int> work(const Options& o, Run& run) {
   if (run.options.json) VOX_CHECK(print(json_of(encoding, run, report, o, notes, diff).text()));
   if (!run.options.quiet && !run.options.json)
     tell(fmt::format(
-        "{}: {} voxels in {} bytes: geometry {}, colors {} ({:.4g} %){}{}, error {:.4g}, in {:.2f} s{}",
+        "{}: {} voxels in {} bytes: geometry {}, colors {} ({:.4g} %){}{}{}, error {:.4g}, in {:.2f} s{}",
         o.output, p.leaf_voxels, encoding.file_bytes, p.dag_bytes, p.color_bytes, color_percent(p),
+        attribute_bytes_text(report.attributes),
         p.simplify > 0 ? fmt::format(", simplified: {:.4g} voxels off", p.hausdorff) : "",
         emits ? ", emission added" : "", p.grmse, encoding.seconds,
         diff ? fmt::format(", greatest error {:.4g}", diff->max_distance) : ""));
@@ -287,6 +311,7 @@ int main(int argc, char** argv) {
       "  dagcolor-pack house.glb -o house.dagc --codec bc1 --image-curve hilbert\n"
       "  dagcolor-pack house.glb tree.ply --at 12,0,-3.5 -o garden.dagc\n"
       "  dagcolor-pack house.dagc -o coarse.dagc --resolution 512\n"
+      "  dagcolor-pack scan.ply -o scan.dagc --attributes color,normal,id\n"
       "  dagcolor-pack house.dagc --tiles tile-%04d.dds -o other.dagc --codec bc7\n",
       [&](CommandLine& line) { declare(line, options); }, [&](Run& run) { return work(options, run); });
 }

@@ -11,6 +11,7 @@
 #include "formats/volume/readers.h"
 #include "libcolor/edit/levels.h"
 #include "libsvmm/packed/salvage.h"
+#include "tools/common/attributes.h"
 #include "tools/common/input.h"
 #include "tools/common/json.h"
 #include "tools/common/main.h"
@@ -214,6 +215,13 @@ Result<int> work(const Options& o, Run& run) {
   VOX_TRY(source, retyped(std::move(source), nullptr, o.type, o.range, run));
   source = fill_restored(std::move(source));
   const VolumeInfo info = source->info();
+  if (input.color) {
+    color::AttributeSet set = input.color->params().attributes;
+    // That is alpha.
+    if (info.format == VoxelFormat::rgba32) set.remove(color::Attribute::opacity);
+    if (!set.empty())
+      run.say(fmt::format("{}: dropped: {}: points (.ply) have all attributes", o.output, names_of(set)));
+  }
   VOX_CHECK(warn_of_size(o, input, info, run));
   VOX_TRY(auto sink, create_volume(o.output, info, run.options.force, run.ctx));
   run.stage("decode");

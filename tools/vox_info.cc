@@ -7,6 +7,7 @@
 #include "formats/volume/open_volume.h"
 #include "formats/volume/readers.h"
 #include "formats/volume/volume_formats.h"
+#include "tools/common/attributes.h"
 #include "tools/common/color_report.h"
 #include "tools/common/input.h"
 #include "tools/common/json.h"
@@ -117,7 +118,11 @@ Json json_of(const Options& o, const Run& run, const Input& input, std::optional
   }
   if (input.packed) json.set("levels", levels_json(*input.packed));
   if (input.vq) add_sizes(input.vq->params(), json);
-  if (input.color) add_sizes(input.color->params(), json);
+  if (input.color) {
+    add_sizes(input.color->params(), json);
+    if (const auto& attributes = input.color->attributes(); !attributes.empty())
+      json.set("attributes", attributes_json(attributes, input.color->params().leaf_voxels));
+  }
   if (o.check) json.set("checked", true);
   return json;
 }
@@ -196,7 +201,10 @@ std::string text_of(const Options& o, const Input& input, std::optional<uint64_t
   }
   if (input.packed) text += levels_text(*input.packed);
   if (input.vq) text += sizes_text(*input.vq);
-  if (input.color) text += sizes_text(input.color->params());
+  if (input.color) {
+    text += sizes_text(input.color->params());
+    text += attributes_text(input.color->attributes(), input.color->params().color_count);
+  }
   if (o.check) text += "check       passed\n";
   return text;
 }

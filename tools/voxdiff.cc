@@ -11,10 +11,13 @@
 #include "formats/image/image.h"
 #include "formats/names.h"
 #include "formats/volume/open_volume.h"
+#include "libcolor/attributes/attribute_selection.h"
+#include "libcolor/edit/levels.h"
 #include "libmetrics/color_distance.h"
 #include "libmetrics/image_diff.h"
 #include "libmetrics/ssim.h"
 #include "libmetrics/volume_diff.h"
+#include "tools/common/attributes.h"
 #include "tools/common/input.h"
 #include "tools/common/json.h"
 #include "tools/common/main.h"
@@ -36,7 +39,9 @@ void declare(CommandLine& line, Options& o) {
   line.argument("A", "The reference: a volume, a compressed volume, an image, or -", o.a);
   line.argument("B", "What is compared with it", o.b);
   line.option("--fail-psnr", "DB", "Exit 1 if the PSNR is below", number(o.fail_psnr, -largest, largest));
-  line.option("--fail-max", "E", "Exit 1 if an absolute error is above", number(o.fail_max, 0, largest));
+  line.option("--fail-max", "E",
+              "Exit 1 if an absolute error is above; of attributes, too, where .dagc files have them",
+              number(o.fail_max, 0, largest));
   line.option("--fail-ms-ssim", "S", "Images: exit 1 if the MS-SSIM is below", number(o.fail_ms_ssim, 0, 1));
   line.option("--space", "srgb|lab", "Images: lab adds differences in CIELAB (CIE 1976; default: srgb)",
               one_of(o.space, {"srgb", "lab"}));
@@ -76,8 +81,63 @@ std::string readable_line(const ErrorHistogram& histogram) {
   return text + "\n";
 }
 
-Json describe(const VolumeDiff& d, const ErrorHistogram& histogram, const Run& run, const Options& o,
-              bool passed) {
+/// What the voxels of two compressed surfaces have beside colours.
+struct AttributesDiff {
+  color::AttributeSet only_a, only_b;
+  std::vector<color::AttributeDiff> both;
+
+  bool passes(std::optional<double> most) const {
+    if (!most) return true;
+    return only_a.empty() && only_b.empty() &&
+           std::ranges::all_of(both, [&](const auto& d) { return d.most_error <= *most; });
+  }
+};
+
+/// Of voxels that are in both; nothing where neither has any, or one is no compressed surface.
+Result<std::optional<AttributesDiff>> compare_attributes(const Input& a, const Input& b, Context& ctx) {
+  std::optional<AttributesDiff> none;
+  const auto set_of = [](const Input& input) {
+    return input.color ? input.color->params().attributes : color::AttributeSet();
+  };
+  const color::AttributeSet in_a = set_of(a), in_b = set_of(b);
+  if (!a.color || !b.color || (in_a.empty() && in_b.empty())) return none;
+  AttributesDiff diff{without(in_a, in_b), without(in_b, in_a), {}};
+  auto surface = color::with_attributes(color::surface_of(a.color), without(in_a, diff.only_a));
+  VOX_TRY(color::SurfaceDiff found, color::compare(*surface, *b.color, ctx));
+  diff.both = std::move(found.attributes);
+  return std::optional(std::move(diff));
+}
+
+Json describe(const AttributesDiff& diff) {
+  Json list = Json::array();
+  for (const color::AttributeDiff& d : diff.both) {
+    Json one = Json::object();
+    one.set("name", color::kind_of(d.attribute).name).set("differing_voxels", d.differing);
+    one.set("max_error", d.most_error);
+    list.push(std::move(one));
+  }
+  for (const auto& [set, where] : {std::pair{diff.only_a, "a"}, std::pair{diff.only_b, "b"}})
+    for (size_t i = 0; i < color::attribute_kinds.size(); ++i) {
+      if (!set.has(static_cast<color::Attribute>(i))) continue;
+      Json one = Json::object();
+      one.set("name", color::attribute_kinds[i].name).set("only_in", where);
+      list.push(std::move(one));
+    }
+  return list;
+}
+
+std::string readable_lines(const AttributesDiff& diff) {
+  std::string text;
+  for (const color::AttributeDiff& d : diff.both)
+    text += fmt::format("{:<18}{} voxels differ, by up to {:.4g}{}\n", color::kind_of(d.attribute).name,
+                        d.differing, d.most_error, d.attribute == color::Attribute::normal ? " degrees" : "");
+  if (!diff.only_a.empty()) text += fmt::format("only A has        {}\n", names_of(diff.only_a));
+  if (!diff.only_b.empty()) text += fmt::format("only B has        {}\n", names_of(diff.only_b));
+  return text;
+}
+
+Json describe(const VolumeDiff& d, const std::optional<AttributesDiff>& attributes,
+              const ErrorHistogram& histogram, const Run& run, const Options& o, bool passed) {
   Json json = Json::result();
   json.set("tool", run.tool).set("version", version_text()).set("a", o.a).set("b", o.b);
   json.set("dims", d.dims)
@@ -89,6 +149,7 @@ Json describe(const VolumeDiff& d, const ErrorHistogram& histogram, const Run& r
       .set("differing_voxels", d.differing_voxels)
       .set("snr_db", d.snr_db);
   if (d.grmse) json.set("grmse", *d.grmse).set("grmse_distance", *d.grmse_distance);
+  if (attributes) json.set("attributes", describe(*attributes));
   json.set("histogram", describe(histogram)).set("passed", passed);
   return json;
 }
@@ -162,12 +223,15 @@ Result<int> compare_volumes(const Options& o, Run& run) {
   VOX_TRY(const VolumeDiff d,
           diff_volumes(*a.source, *b.source, o.peak, sink.get(), run.ctx, count ? &histogram : nullptr));
 
-  const bool passed =
-      !(o.fail_psnr && !(d.psnr_db >= *o.fail_psnr)) && !(o.fail_max && !(d.max_abs_error <= *o.fail_max));
+  VOX_TRY(const auto attributes, compare_attributes(a, b, run.ctx));
+  const bool passed = !(o.fail_psnr && !(d.psnr_db >= *o.fail_psnr)) &&
+                      !(o.fail_max && !(d.max_abs_error <= *o.fail_max)) &&
+                      (!attributes || attributes->passes(o.fail_max));
   if (run.options.json) {
-    VOX_CHECK(print(describe(d, histogram, run, o, passed).text()));
+    VOX_CHECK(print(describe(d, attributes, histogram, run, o, passed).text()));
   } else if (!run.options.quiet) {
-    VOX_CHECK(print(readable_lines(d) + (o.histogram ? readable_line(histogram) : "")));
+    VOX_CHECK(print(readable_lines(d) + (attributes ? readable_lines(*attributes) : "") +
+                    (o.histogram ? readable_line(histogram) : "")));
   }
   return passed ? 0 : 1;
 }

@@ -18,21 +18,28 @@ bool needs_doubles(double from, double to, double step) {
 }
 
 Result<PlyPointWriter> PlyPointWriter::create(const std::string& path, uint64_t count, bool doubles,
-                                              bool force) {
+                                              bool force, std::span<const PlyProperty> more) {
   VOX_TRY(auto out, OutputFile::create(path, force));
-  const std::string header = fmt::format(
+  std::string header = fmt::format(
       "ply\nformat binary_little_endian 1.0\nelement vertex {0}\nproperty {1} x\nproperty {1} y\nproperty "
       "{1} z\n"
-      "property uchar red\nproperty uchar green\nproperty uchar blue\nend_header\n",
+      "property uchar red\nproperty uchar green\nproperty uchar blue\n",
       count, doubles ? "double" : "float");
+  size_t more_bytes = 0;
+  for (const PlyProperty& property : more) {
+    header += fmt::format("property {} {}\n", property.type, property.name);
+    more_bytes += property.bytes;
+  }
+  header += "end_header\n";
   VOX_CHECK(out->write(std::as_bytes(std::span(header))));
-  return PlyPointWriter(std::move(out), doubles);
+  return PlyPointWriter(std::move(out), doubles, more_bytes);
 }
 
-Status PlyPointWriter::add(std::span<const ColoredPoint> points) {
+Status PlyPointWriter::add(std::span<const ColoredPoint> points, std::span<const std::byte> more) {
   const size_t place_bytes = doubles_ ? 24 : 12;
-  std::vector<std::byte> bytes(points.size() * (place_bytes + 3));
+  std::vector<std::byte> bytes(points.size() * (place_bytes + 3 + more_bytes_));
   std::byte* to = bytes.data();
+  const std::byte* from = more.data();
   for (const ColoredPoint& point : points) {
     if (doubles_) {
       std::memcpy(to, point.at.data(), place_bytes);
@@ -43,6 +50,10 @@ Status PlyPointWriter::add(std::span<const ColoredPoint> points) {
     }
     std::memcpy(to + place_bytes, point.color.data(), 3);
     to += place_bytes + 3;
+    if (more_bytes_ == 0) continue;
+    std::memcpy(to, from, more_bytes_);
+    to += more_bytes_;
+    from += more_bytes_;
   }
   return out_->write(bytes);
 }

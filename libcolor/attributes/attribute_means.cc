@@ -92,4 +92,28 @@ void AttributeMeans::put(const AttributeSums& sums, int height, std::span<std::b
   if (set_.has(Attribute::id)) set(Attribute::id, sums.votes[0].id);
 }
 
+void AttributeCells::close(size_t height, std::vector<std::byte>& values) {
+  AttributeSums& sums = sums_[height];
+  sums.elect();
+  if (height + 1 < sums_.size()) {
+    sums_[height + 1].add(sums);
+  } else {
+    values.resize(values.size() + bytes_);
+    means_.put(sums, static_cast<int>(height), std::span(values).last(bytes_));
+  }
+  sums = {};
+}
+
+void AttributeCells::add(uint64_t place, std::span<const std::byte> voxel, std::vector<std::byte>& values) {
+  if (sums_[1].voxels > 0)
+    for (size_t h = 1; h < sums_.size() && place >> 3 * h != place_ >> 3 * h; ++h) close(h, values);
+  sums_[1].add(means_.of(voxel));
+  place_ = place;
+}
+
+void AttributeCells::finish(std::vector<std::byte>& values) {
+  if (sums_[1].voxels == 0) return;
+  for (size_t h = 1; h < sums_.size(); ++h) close(h, values);
+}
+
 }  // namespace voxkit::color

@@ -3,6 +3,7 @@
 
 #include <array>
 #include <span>
+#include <vector>
 
 #include "libcolor/surface/attributes.h"
 #include "libcolor/surface/linear_light.h"
@@ -41,6 +42,27 @@ class AttributeMeans {
  private:
   AttributeSet set_;
   const LightTables& tables_;
+};
+
+/// The attributes of cells of 2^height voxels a side, from those of voxels in Morton order.
+class AttributeCells {
+ public:
+  /// `height`: 1 or more.
+  AttributeCells(AttributeSet set, int height)
+      : bytes_(set.bytes()), means_(set), sums_(static_cast<size_t>(height) + 1) {}
+  /// Of a voxel that comes behind the one before. If it is in another cell, that one's are appended to
+  /// `values`.
+  void add(uint64_t place, std::span<const std::byte> voxel, std::vector<std::byte>& values);
+  /// Appends those of the last cell, if there is one.
+  void finish(std::vector<std::byte>& values);
+
+ private:
+  void close(size_t height, std::vector<std::byte>& values);
+
+  size_t bytes_;
+  AttributeMeans means_;
+  std::vector<AttributeSums> sums_;  ///< by height, of the cells that the last voxel is in
+  uint64_t place_ = 0;
 };
 
 }  // namespace voxkit::color

@@ -16,14 +16,16 @@ namespace {
 
 /// A surface while it is read.
 struct Reading {
-  Reading(const Placed& placed, const DagView& dag)
+  Reading(const Placed& placed, const DagView& dag, AttributeSet set)
       : volume(*placed.volume),
         view(dag),
         colors(volume.store(), volume.container(), volume.params()),
+        attributes(volume.store(), volume.container(), volume.params(), set),
         box{placed.at, placed.at + volume.info().dims} {}
   const Volume& volume;
   const DagView& view;
   ColorReader colors;
+  AttributesReader attributes;
   Box box;  ///< in the grid
   uint64_t voxels = 0;
 };
@@ -50,8 +52,10 @@ uint32_t octants_touched(Index3 corner, int64_t half, const Box& box) {
 
 class Walk {
  public:
-  Walk(Index3 dims, const SurfaceSource::Sink& sink, Context& ctx, Arrangement::Census& census)
+  Walk(Index3 dims, AttributeSet set, const SurfaceSource::Sink& sink, Context& ctx,
+       Arrangement::Census& census)
       : grid_{Index3(0), dims},
+        set_(set),
         height_(height_of(dims)),
         sink_(sink),
         ctx_(ctx),
@@ -64,7 +68,7 @@ class Walk {
     const Volume& volume = *placed.volume;
     if (volume.params().leaf_voxels == 0) return {};
     VOX_TRY(const DagView* const view, volume.store().dag(volume.container(), volume.params()));
-    Reading& reading = readings_.emplace_back(placed, *view);
+    Reading& reading = readings_.emplace_back(placed, *view, set_);
     return enter({&reading, {view->height, view->root, placed.at, 0, first_state(view->curve)}});
   }
 
@@ -137,6 +141,8 @@ class Walk {
   Status word(Index3 corner, const Pieces& pieces) {
     uint64_t there = 0, shared = 0, differing = 0;
     std::array<Rgb, 64> colors;
+    const size_t bytes = set_.bytes();
+    std::array<std::byte, 64 * all_attribute_bytes> values;
     for (const Piece& piece : pieces) {
       Reading& surface = *piece.surface;
       const WalkedCell& at = piece.cell;
@@ -146,16 +152,20 @@ class Walk {
           intersect({corner, corner + (int64_t{1} << leaf_height)}, intersect(surface.box, grid_));
       for (uint64_t left = leaf & leaf_within(at.corner, inside); left != 0; left &= left - 1) {
         const auto bit = static_cast<uint32_t>(std::countr_zero(left));
-        const Rgb color =
-            surface.colors.color(at.color + leaf_index(leaf, bit, surface.view.colors, at.state));
+        const uint64_t index = at.color + leaf_index(leaf, bit, surface.view.colors, at.state);
+        const Rgb color = surface.colors.color(index);
+        own_.clear();
+        surface.attributes.append(index, own_);
         const uint64_t to = code_of(at.corner + Index3(morton_place(bit)) - corner);
         const uint64_t to_bit = uint64_t{1} << to;
         if ((there & to_bit) == 0) {
           there |= to_bit;
           colors[to] = color;
+          std::ranges::copy(own_, &values[to * bytes]);
         } else {
           shared |= to_bit;
-          if (color != colors[to]) differing |= to_bit;
+          if (color != colors[to] || !std::equal(own_.begin(), own_.end(), &values[to * bytes]))
+            differing |= to_bit;
         }
         ++surface.voxels;
       }
@@ -165,6 +175,7 @@ class Walk {
     for (uint64_t left = there; left != 0; left &= left - 1) {
       const auto bit = static_cast<size_t>(std::countr_zero(left));
       run_.push_back({first | bit, colors[bit]});
+      values_.insert(values_.end(), &values[bit * bytes], &values[bit * bytes] + bytes);
     }
     census_.voxels += static_cast<uint64_t>(std::popcount(there));
     census_.shared += static_cast<uint64_t>(std::popcount(shared));
@@ -175,8 +186,9 @@ class Walk {
   Status flush() {
     VOX_CHECK(check_interrupt());
     for (const Reading& surface : readings_) VOX_CHECK(surface.volume.store().status());
-    const Status taken = run_.empty() ? Status() : sink_(run_);
+    const Status taken = run_.empty() ? Status() : sink_({run_, values_});
     run_.clear();
+    values_.clear();
     return taken;
   }
 
@@ -191,6 +203,7 @@ class Walk {
 
   static constexpr size_t run_voxels = 1 << 14;
   Box grid_;
+  AttributeSet set_;
   int height_;
   const SurfaceSource::Sink& sink_;
   Context& ctx_;
@@ -199,13 +212,28 @@ class Walk {
   Pieces roots_;
   std::vector<std::array<Pieces, 8>> below_;  ///< by height: what reaches into the octants of the cell above
   std::vector<SurfaceVoxel> run_;
+  std::vector<std::byte> values_, own_;  ///< attributes: of the run; of a voxel
 };
+
+/// What all of them have.
+AttributeSet common_attributes(std::span<const Placed> surfaces) {
+  AttributeSet set;
+  for (size_t i = 0; i < attribute_kinds.size(); ++i) {
+    const auto attribute = static_cast<Attribute>(i);
+    if (std::ranges::all_of(surfaces, [&](const Placed& placed) {
+          return placed.volume->params().attributes.has(attribute);
+        }))
+      set.add(attribute);
+  }
+  return set;
+}
 
 }  // namespace
 
 Arrangement::Arrangement(std::vector<Placed> surfaces, VolumeInfo info) : surfaces_(std::move(surfaces)) {
   info_ = std::move(info);
   info_.format = VoxelFormat::rgba32;
+  attributes_ = common_attributes(surfaces_);
 }
 
 Status Arrangement::read(Context& ctx, const Sink& sink) {
@@ -214,7 +242,7 @@ Status Arrangement::read(Context& ctx, const Sink& sink) {
   constexpr uint64_t surface_bytes = (most_levels + 1) * 8 * 8 * 2 * sizeof(Piece) + sizeof(Reading);
   VOX_TRY(const Reservation memory,
           Reservation::take(surfaces_.size() * surface_bytes, "a walk through surfaces", ctx));
-  Walk walk(info_.dims, sink, ctx, census_);
+  Walk walk(info_.dims, attributes_, sink, ctx, census_);
   for (const Placed& placed : surfaces_) VOX_CHECK(walk.add(placed));
   return walk.run();
 }

@@ -15,7 +15,8 @@ struct Placed {
   Index3 at{0};
 };
 
-/// The voxels of some surfaces in a grid, with the colours that they have. Where several have one, that of
+/// The voxels of some surfaces in a grid, with the colours, and of attributes those that all of the surfaces
+/// have. Where several have one, that of
 /// the first one counts. What is outside of the grid is left out. Memory: 160 KiB a surface.
 class Arrangement final : public SurfaceSource {
  public:
@@ -30,7 +31,7 @@ class Arrangement final : public SurfaceSource {
   struct Census {
     uint64_t voxels = 0;
     uint64_t shared = 0;     ///< voxels that more surfaces than one have
-    uint64_t differing = 0;  ///< those of them that have more colours than one
+    uint64_t differing = 0;  ///< those of them that have more colours, or other attributes, than one
     uint64_t cells = 0;      ///< of the grid that were entered
   };
   const Census& census() const { return census_; }

@@ -13,6 +13,7 @@ Options exact_options(std::span<const Params> files) {
   options.image_curve = first.image_curve;
   options.codec = ColorCodec::vws;
   options.threshold = 0;
+  options.attribute_thresholds.fill(0);
   if (first.codec == ColorCodec::raw || first.codec == ColorCodec::png || first.codec == ColorCodec::jp2)
     options.codec = first.codec;
   // With as many colours as all palettes have, each is one of the new palette. Those of nodes are new.

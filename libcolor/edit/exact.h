@@ -7,10 +7,10 @@
 
 namespace voxkit::color {
 
-/// Options with which the colours of files with these parameters are stored exactly, as much as can be as the
-/// first file has them: its curves, its counts, its geometry, colours of nodes if it has them; its codec if
-/// that can be lossless: raw, png, jp2, and palette if all of them are and their palettes have no more than
-/// 2^16 colours together. Else blocks of variable weights with a threshold of 0.
+/// Options with which the colours and attributes of files with these parameters are stored exactly, as much
+/// as can be as the first file has them: its curves, its counts, its geometry, colours of nodes if it has
+/// them; its codec if that can be lossless: raw, png, jp2, and palette if all of them are and their palettes
+/// have no more than 2^16 colours together. Else blocks of variable weights with a threshold of 0.
 Options exact_options(std::span<const Params> files);
 
 }  // namespace voxkit::color

@@ -7,6 +7,7 @@
 #include <cmath>
 #include <cstring>
 
+#include "libcolor/attributes/attribute_means.h"
 #include "libcolor/edit/sound_walk.h"
 #include "libcolor/part_codecs.h"
 #include "libcolor/surface/morton.h"
@@ -20,14 +21,27 @@ uint64_t code_of(Index3 place) {
                      static_cast<uint32_t>(place.z));
 }
 
-/// Makes voxels of the volume, as they come, voxels of a level.
+/// Makes voxels of the volume, as they come, voxels of a level, above 0.
 template <class Read>
-Status means_of(int level, const SurfaceSource::Sink& sink, const Read& read) {
-  VoxelMeans means(sink);
-  VOX_CHECK(read([&](std::span<const SurfaceVoxel> run) -> Status {
-    for (const SurfaceVoxel& voxel : run) VOX_CHECK(means.add({voxel.place >> 3 * level, voxel.color}));
+Status means_of(int level, AttributeSet set, const SurfaceSource::Sink& sink, const Read& read) {
+  AttributeCells cells(set, level);
+  std::vector<std::byte> values;
+  const SurfaceSource::Sink with_values = [&](const VoxelRun& run) {
+    const Status taken = sink({run.voxels, values});
+    values.clear();
+    return taken;
+  };
+  VoxelMeans means(with_values);
+  const size_t bytes = set.bytes();
+  VOX_CHECK(read([&](const VoxelRun& run) -> Status {
+    for (size_t i = 0; i < run.voxels.size(); ++i) {
+      const SurfaceVoxel& voxel = run.voxels[i];
+      if (bytes > 0) cells.add(voxel.place, run.attributes.subspan(i * bytes, bytes), values);
+      VOX_CHECK(means.add({voxel.place >> 3 * level, voxel.color}));
+    }
     return {};
   }));
+  cells.finish(values);
   return means.finish();
 }
 
@@ -35,6 +49,7 @@ class LevelSurface final : public SurfaceSource {
  public:
   explicit LevelSurface(Level level) : level_(std::move(level)) {
     info_ = level_.info();
+    attributes_ = level_.attributes();
     const Params& params = level_.volume().params();
     if (params.grmse > 0)
       notes_.push_back(
@@ -57,11 +72,14 @@ class LevelSource final : public VolumeSource {
   explicit LevelSource(Level level) : level_(std::move(level)) { info_ = level_.info(); }
   Status read(const Box& box, VoxelSpan out) override {
     fill(out, box.size(), VoxelFormat::rgba32, {});
-    return level_.for_each_voxel(box, [&](std::span<const SurfaceVoxel> run) -> Status {
-      for (const SurfaceVoxel& voxel : run) {
+    const AttributeSet set = level_.attributes();
+    return level_.for_each_voxel(box, [&](const VoxelRun& run) -> Status {
+      for (size_t i = 0; i < run.voxels.size(); ++i) {
+        const SurfaceVoxel& voxel = run.voxels[i];
         const Index3 at = Index3(morton_place(voxel.place)) - box.lo;
         std::byte* const to = out.row(at.y, at.z) + at.x * 4;
-        const std::array<uint8_t, 4> bytes = {voxel.color.r, voxel.color.g, voxel.color.b, 255};
+        const std::array<uint8_t, 4> bytes = {voxel.color.r, voxel.color.g, voxel.color.b,
+                                              alpha_of(run, i, set)};
         std::memcpy(to, bytes.data(), bytes.size());
       }
       return {};
@@ -134,13 +152,13 @@ Status Level::for_each_voxel(const SurfaceSource::Sink& sink, Context& ctx) cons
   const double end = std::ldexp(1.0, 3 * volume_->params().height);
   const auto all = [&](const SurfaceSource::Sink& to) {
     return volume_->for_each_voxel(
-        [&](std::span<const SurfaceVoxel> run) {
-          ctx.progress(static_cast<double>(run.front().place) / end);
+        [&](const VoxelRun& run) {
+          ctx.progress(static_cast<double>(run.voxels.front().place) / end);
           return to(run);
         },
         ctx);
   };
-  return level_ == 0 ? all(sink) : means_of(level_, sink, all);
+  return level_ == 0 ? all(sink) : means_of(level_, attributes(), sink, all);
 }
 
 Status Level::for_each_voxel(const Box& box, const SurfaceSource::Sink& sink) const {
@@ -148,7 +166,7 @@ Status Level::for_each_voxel(const Box& box, const SurfaceSource::Sink& sink) co
   const auto inside = [&](const SurfaceSource::Sink& to) {
     return volume_->for_each_voxel(voxels_of(box), to);
   };
-  return level_ == 0 ? inside(sink) : means_of(level_, sink, inside);
+  return level_ == 0 ? inside(sink) : means_of(level_, attributes(), sink, inside);
 }
 
 /// Those whose colours the file has.
@@ -157,26 +175,32 @@ Status Level::cells(const Box& box, const SurfaceSource::Sink& sink) const {
   const Box part = voxels_of(box);
   VOX_TRY(const DagView* const view, volume_->store().dag(volume_->container(), volume_->params()));
   ColorReader reader(volume_->store(), volume_->container(), volume_->params());
+  AttributesReader attributes(volume_->store(), volume_->container(), volume_->params());
   constexpr size_t run_voxels = 1 << 14;
   std::vector<SurfaceVoxel> run;
   run.reserve(run_voxels + 8);
+  std::vector<std::byte> values;
   const auto flush = [&]() -> Status {
     VOX_CHECK(volume_->store().status());
-    const Status taken = run.empty() ? Status() : sink(run);
+    const Status taken = run.empty() ? Status() : sink({run, values});
     run.clear();
+    values.clear();
     return taken;
+  };
+  const auto add = [&](uint64_t place, uint64_t index) {
+    run.push_back({place, reader.color(index)});
+    attributes.append(index, values);
   };
   VOX_CHECK(sound_walk(*volume_, *view, part, level_, [&](const WalkedCell& cell) -> Status {
     const uint64_t place = code_of(cell.corner) >> 3 * level_;
     if (level_ >= leaf_height) {
-      run.push_back({place, reader.color(cell.color)});
+      add(place, cell.color);
     } else {
       const uint64_t leaf = view->leaf(cell.pointer);
       const uint32_t octants = leaf_octants(leaf & leaf_within(cell.corner, part));
       for (uint32_t left = octants; left != 0; left &= left - 1) {
         const auto octant = static_cast<uint32_t>(std::countr_zero(left));
-        run.push_back({place | octant,
-                       reader.color(cell.color + leaf_cell_index(leaf, 8 * octant, level_, cell.state))});
+        add(place | octant, cell.color + leaf_cell_index(leaf, 8 * octant, level_, cell.state));
       }
     }
     return run.size() < run_voxels ? Status() : flush();

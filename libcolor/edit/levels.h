@@ -29,6 +29,8 @@ class Level {
 
   const VolumeInfo& info() const { return info_; }
   const Volume& volume() const { return *volume_; }
+  /// What its voxels have beside colours: as cells of the file have it (attribute_means.h).
+  AttributeSet attributes() const { return volume_->params().attributes; }
   /// The voxels of the level that a box of the volume touches, and those of the volume that are in a box of
   /// the level.
   Box touched(const Box& box) const;

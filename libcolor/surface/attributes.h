@@ -28,6 +28,13 @@ constexpr const AttributeKind& kind_of(Attribute attribute) {
   return attribute_kinds[static_cast<size_t>(attribute)];
 }
 
+/// Of all of them.
+inline constexpr size_t all_attribute_bytes = [] {
+  size_t bytes = 0;
+  for (const AttributeKind& kind : attribute_kinds) bytes += kind.bytes;
+  return bytes;
+}();
+
 /// Which attributes the voxels of a surface have. Those of a voxel lie one after the other, by number.
 class AttributeSet {
  public:

@@ -43,6 +43,14 @@ struct VoxelRun {
   operator std::span<const SurfaceVoxel>() const { return voxels; }
 };
 
+/// The alpha of voxel `i` of a run: its opacity, and at least 1, if voxels have that, else 255.
+inline uint8_t alpha_of(const VoxelRun& run, size_t i, AttributeSet set) {
+  if (!set.has(Attribute::opacity)) return 255;
+  const auto opacity =
+      std::to_integer<uint8_t>(run.attributes[i * set.bytes() + set.offset(Attribute::opacity)]);
+  return opacity == 0 ? uint8_t{1} : opacity;
+}
+
 /// A coloured surface that is read once, in Morton order, in bounded memory.
 class SurfaceSource {
  public:

@@ -35,7 +35,7 @@ libcolor/attributes -> formats libcolor/surface libcolor/terms libcolor/dag libc
 libcolor/textures -> formats formats/image libcolor/surface libcolor/terms libcolor/blocks
 libcolor/simplify -> formats libcolor/surface libcolor/terms libcolor/dag
 libcolor          -> formats formats/image libcolor/surface libcolor/terms libcolor/dag libcolor/octree libcolor/blocks libcolor/palette libcolor/attributes libcolor/textures libcolor/simplify
-libcolor/edit     -> formats libcolor libcolor/surface libcolor/terms libcolor/dag
+libcolor/edit     -> formats libcolor libcolor/surface libcolor/terms libcolor/dag libcolor/attributes
 libmetrics        -> formats formats/image
 librender         -> formats formats/image libcolor/surface
 librender/cast    -> formats librender libsvmm libsvmm/packed libcolor libcolor/dag libcolor/attributes libcolor/surface

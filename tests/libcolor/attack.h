@@ -25,7 +25,9 @@ inline std::string ask_box(const Volume& volume, const Box& box) {
     for (int64_t y = 0; y < size.y; y += 1 + size.y / 5)
       for (int64_t x = 0; x < size.x; x += 1 + size.x / 5) {
         const std::byte* const p = span.row(y, z) + 4 * x;
-        if (p[3] != std::byte{0} && p[3] != std::byte{255}) return "an alpha that is neither 0 nor 255";
+        if (p[3] != std::byte{0} && p[3] != std::byte{255} &&
+            !volume.params().attributes.has(Attribute::opacity))
+          return "an alpha that is neither 0 nor 255, without opacity";
         const Index3 at = box.lo + Index3(x, y, z);
         const auto voxel = volume.voxel(at);
         if (!voxel) {
@@ -51,18 +53,20 @@ inline void ask(const Volume& volume, Answer& answer, Context& ctx) {
         answer.fault = voxkit::test::judge(color.error());
   // All voxels, as long as there are not too many.
   uint64_t count = 0, next = 0;
-  bool ordered = true;
+  bool ordered = true, complete = true;
   const Status walked = volume.for_each_voxel(
-      [&](std::span<const SurfaceVoxel> run) -> Status {
-        for (const SurfaceVoxel& v : run) {
+      [&](const VoxelRun& run) -> Status {
+        for (const SurfaceVoxel& v : run.voxels) {
           ordered &= v.place >= next;
           next = v.place + 1;
         }
-        count += run.size();
+        complete &= run.attributes.size() == run.voxels.size() * volume.params().attributes.bytes();
+        count += run.voxels.size();
         return count > 1000000 ? fail(ErrorCode::limit, {}, "enough") : Status();
       },
       ctx);
   if (!ordered) answer.fault = "voxels out of order";
+  if (!complete) answer.fault = "voxels without their attributes";
   if (!walked && answer.fault.empty()) answer.fault = voxkit::test::judge(walked.error());
   if (!walked && answer.checked && walked.error().code != ErrorCode::limit)
     answer.fault = "check() finds nothing wrong, but voxels cannot be read: " + walked.error().what;

@@ -123,8 +123,7 @@ struct Case {
 };
 std::vector<Case> cases() {
   std::vector<Case> all;
-  for (const ColorCodec codec :
-       {ColorCodec::raw, ColorCodec::vws, ColorCodec::fws, ColorCodec::palette, ColorCodec::bc1})
+  for (const ColorCodec codec : {ColorCodec::raw, ColorCodec::vws, ColorCodec::fws})
     for (const Colors colors : {Colors::leaf, Colors::all})
       for (const Curve curve : {Curve::morton, Curve::hilbert}) {
         Options options;

@@ -6,7 +6,7 @@
 #include "formats/volume_chunks.h"
 #include "tests/damage.h"
 #include "tests/libcolor/attack.h"
-#include "tests/libcolor/scenes.h"
+#include "tests/libcolor/attribute_scenes.h"
 
 namespace voxkit::color {
 namespace {
@@ -44,6 +44,16 @@ const std::vector<Bytes>& files() {
               none({}, Index3(9, 2, 3));
           for (ListSource* source : {&shell, &few, &none}) made.push_back(compressed(*source, options));
         }
+    for (const ColorCodec codec : {ColorCodec::raw, ColorCodec::fws, ColorCodec::vws})
+      for (const Pattern pattern : {Pattern::runs, Pattern::random}) {
+        Options options;
+        options.codec = codec;
+        if (pattern == Pattern::runs) options.colors = Colors::all;
+        const Voxels voxels = sphere_shell(3);
+        AttributedSource source(voxels, Index3(8), all_attributes(),
+                                interleaved(all_attributes(), voxels.size(), pattern, 3));
+        made.push_back(compressed(source, options));
+      }
     return made;
   }();
   return all;

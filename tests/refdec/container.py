@@ -81,7 +81,7 @@ def unzstd(frame, length):
 
 Chunk = namedtuple("Chunk", "kind index part offset length checksum")
 KINDS = (b"VOLI", b"VOLX", b"SVMP", b"BLKS", b"VQPM", b"OFFS", b"ADDR", b"CODE", b"DAGP", b"LEAF", b"NODE",
-         b"COLR", b"PALT", b"PAKP", b"MODL", b"MMOD", b"PAGE", b"MASK", b"RNGE", b"CTAB", b"OCTD", b"SNOD")  # any other kind is ignored
+         b"COLR", b"ATTP", b"ATTR", b"PALT", b"PAKP", b"MODL", b"MMOD", b"PAGE", b"MASK", b"RNGE", b"CTAB", b"OCTD", b"SNOD")  # any other kind is ignored
 
 
 class Container:

@@ -13,6 +13,7 @@ import json
 import struct
 import sys
 
+from attribute_decode import read_attributes
 from container import Container, Refused, Volume, require
 from octree_decode import Octree
 from png_decode import read_png
@@ -54,6 +55,7 @@ class Surface:
         self.read_parameters(container.only(b"DAGP"))
         self.read_nodes()
         self.read_parts()
+        self.attributes = read_attributes(self)
 
     # Section 4.1
     def read_parameters(self, chunk):
@@ -219,7 +221,11 @@ class Surface:
         self.palette = self.raw(self.container.data[chunk.offset:chunk.offset + chunk.length], size)
 
     def palettes(self, data, n):
-        g, m = max(self.palette_size - 1, 0).bit_length(), -(-n // MACRO)
+        return [self.palette[i] for i in self.numbers(data, n, self.palette_size)]
+
+    def numbers(self, data, n, palette_size):
+        """Those of n colours in a palette of that size."""
+        g, m = max(palette_size - 1, 0).bit_length(), -(-n // MACRO)
         require(len(data) >= 16 + 8 * m, "chunk COLR: {} bytes", len(data))
         b, e = struct.unpack_from("<II", data)
         first_entry = 8 + 8 * m + 7 * b
@@ -248,8 +254,8 @@ class Surface:
                 indices = [run >> w * i & (1 << w) - 1 for i in range(t - s)]
                 require(v == 15 or a + max(indices) < e, "chunk COLR: entries behind the end")
                 numbers += indices if v == 15 else [entries[a + i] for i in indices]
-        require(max(numbers) < len(self.palette), "chunk COLR: no colour {}", max(numbers))
-        return [self.palette[i] for i in numbers]
+        require(max(numbers) < palette_size, "chunk COLR: no colour {}", max(numbers))
+        return numbers
 
     # Section 4.8
     def png(self, data, n):
@@ -259,7 +265,13 @@ class Surface:
         return [rows[y][x] for x, y in pixels]
 
     def part(self, data, n):
-        h, m = (8 if self.endpoints == 1 else 10), -(-n // MACRO)
+        return self.blocks(data, n, self.endpoints)
+
+    @staticmethod
+    def blocks(data, n, endpoints):
+        """n values; those of attributes may have one or two bytes (section 4.11)."""
+        own = {1: 3, 2: 3, 3: 1, 4: 2}[endpoints]
+        h, m = (8 if endpoints == 1 else 4 + 2 * own), -(-n // MACRO)
         require(len(data) >= 16 + 16 * m, "chunk COLR: {} bytes", len(data))
         b = struct.unpack_from("<I", data)[0]
         start = (8 + 16 * m + h * b + 7) // 8 * 8
@@ -273,30 +285,31 @@ class Surface:
         for k in range(m):
             size, (first, bit) = min(MACRO, n - MACRO * k), heads[k]
             if first >> 63:
-                require(firsts[k] == firsts[k + 1] and bit % 8 == 0 and bit + 24 * size <= end,
+                require(firsts[k] == firsts[k + 1] and bit % 8 == 0 and bit + 8 * own * size <= end,
                         "chunk COLR: macro block {}", k)
                 at = start + bit // 8
-                colors += [tuple(data[at + 3 * i:at + 3 * i + 3]) for i in range(size)]
+                colors += [tuple(data[at + own * i:at + own * i + own]) for i in range(size)]
                 continue
             headers = [data[8 + 16 * m + h * j:8 + 16 * m + h * (j + 1)] for j in range(firsts[k], firsts[k + 1])]
             starts = [struct.unpack_from("<I", header)[0] & 0x3FFF for header in headers] + [size]
             require(headers and starts[0] == 0 and all(s < t for s, t in zip(starts, starts[1:])),
                     "chunk COLR: blocks of macro block {}", k)
             for header, s, t in zip(headers, starts, starts[1:]):
-                colors += self.block(header, t - s, weights, bit, end)
+                colors += Surface.block(header, t - s, weights, bit, end, endpoints, own)
         return colors
 
-    def block(self, header, size, weights, bit, end):
+    @staticmethod
+    def block(header, size, weights, bit, end, endpoints, own):
         word = struct.unpack_from("<I", header)[0]
         w, q = (word >> 14 & 3) + 1, word >> 16
         if q == 65535:
-            if self.endpoints == 2:
-                return [tuple(header[4:7])] * size
+            if endpoints != 1:
+                return [tuple(header[4:4 + own])] * size
             v = struct.unpack_from("<I", header, 4)[0]
             return [((255 * (v & 1023) + 511) // 1023, (255 * (v >> 10 & 4095) + 2047) // 4095,
                      (255 * (v >> 22) + 511) // 1023)] * size
-        if self.endpoints == 2:
-            ends = tuple(header[4:7]), tuple(header[7:10])
+        if endpoints != 1:
+            ends = tuple(header[4:4 + own]), tuple(header[4 + own:])
         else:
             ends = [(8 * (v & 31) + (v & 31) // 4, 4 * (v >> 5 & 63) + (v >> 5 & 63) // 16, 8 * (v >> 11) + (v >> 11) // 4)
                     for v in struct.unpack_from("<HH", header, 4)]
@@ -304,6 +317,10 @@ class Surface:
         require(bit + q + w * size <= end, "chunk COLR: weights behind the end")
         steps = [tuple((2 * (a * (most - v) + c * v) + most) // (2 * most) for a, c in zip(*ends)) for v in range(most + 1)]
         return [steps[weights >> bit + q + w * i & most] for i in range(size)]
+
+
+def alpha(surface, number):
+    return max(1, surface.attributes["opacity"][number][0]) if "opacity" in surface.attributes else 255
 
 
 def decode(surface):
@@ -314,7 +331,7 @@ def decode(surface):
         require(vx < x and vy < y and vz < z, "a voxel at {},{},{}: outside the volume", vx, vy, vz)
         require(number < surface.count, "colour {} of {}", number, surface.count)
         at = 4 * ((vz * y + vy) * x + vx)
-        out[at:at + 4] = bytes(surface.colors[number]) + b"\xff"
+        out[at:at + 4] = bytes(surface.colors[number]) + bytes([alpha(surface, number)])
         found += 1
     require(found == surface.voxels and surface.counted == surface.count, "{} voxels and {} colours: expected {} and {}",
             found, surface.counted, surface.voxels, surface.count)
@@ -324,7 +341,7 @@ def decode(surface):
 def info(surface):
     return {"dims": surface.volume.dims, "codec": CODECS[surface.codec], "colors": surface.has_color,
             "counts": surface.counts, "endpoints": surface.endpoints, "height": surface.height, "geometry": GEOMETRIES[surface.geometry],
-            "leaf_voxels": surface.voxels, "color_count": surface.count, "threshold": surface.threshold}
+            "attributes": list(surface.attributes), "leaf_voxels": surface.voxels, "color_count": surface.count, "threshold": surface.threshold}
 
 
 def main():

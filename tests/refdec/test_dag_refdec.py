@@ -14,6 +14,7 @@ import unittest
 sys.dont_write_bytecode = True
 from container import Container, Refused  # noqa: E402
 from helpers import BIN, HERE, ToolCase, container, read, write  # noqa: E402
+from attribute_decode import direction  # noqa: E402
 from dag_decode import Surface, decode  # noqa: E402
 
 DECODER = os.path.join(HERE, "dag_decode.py")
@@ -49,6 +50,37 @@ class SmallFile(unittest.TestCase):
         self.assertEqual(voxel(5, 1, 1), (255, 255, 255, 255))
         self.assertEqual(voxel(7, 3, 3), (0, 0, 255, 255))
         self.assertEqual(sum(1 for at in range(3, len(out), 4) if out[at]), 10)
+
+    def with_attributes(self, **changed):
+        """The same with an opacity, two normals and two ids."""
+        chunks = dict(opacity=bytes((3, 3)) + bytes(62), opacities=struct.pack("<II", 1, 0) + struct.pack("<QQ", 0, 0) +
+                      struct.pack("<IBB", 65535 << 16, 77, 9) + bytes(2) + bytes(8),
+                      normal=bytes((1,)) + bytes(63), normals=bytes((128, 255)),
+                      id=bytes((7,)) + bytes(63), ids=struct.pack("<III", 2, 5, 1 << 30) + struct.pack("<IIII", 1, 0, 0, 0) +
+                      (15 << 14).to_bytes(7, "little") + bytes((2, 2)) + bytes(8))
+        chunks.update(changed)
+        self.dagp[92] = chunks.get("there", 1 << 1 | 1 << 2 | 1 << 4)
+        more = [(b"ATTP", 1, 0, chunks["opacity"]), (b"ATTR", 1, 0, chunks["opacities"]), (b"ATTP", 2, 0, chunks["normal"]),
+                (b"ATTR", 2, 0, chunks["normals"]), (b"ATTP", 4, 0, chunks["id"]), (b"ATTR", 4, 0, chunks["ids"])]
+        return container([(b"VOLI", 0, 0, self.voli), (b"DAGP", 0, 0, bytes(self.dagp)), (b"LEAF", 0, 0, bytes(self.leaf)),
+                          (b"NODE", 3, 0, bytes(self.node)), (b"COLR", 0, 0, bytes(self.colr)), *more], codec=3)
+
+    def test_attributes(self):
+        surface = Surface(Container(self.with_attributes()))
+        self.assertEqual(list(surface.attributes), ["opacity", "normal", "id"])
+        self.assertEqual(surface.attributes["opacity"], [bytes((77,))] * 10)
+        self.assertEqual(direction(surface.attributes["normal"][3]), (0, 1, 0))
+        self.assertEqual([struct.unpack("<I", i)[0] for i in surface.attributes["id"]], [5 if i not in (1, 9) else 1 << 30 for i in range(10)])
+        self.assertEqual(decode(surface)[3], 77)
+
+    def test_broken_attributes(self):
+        for changed in (dict(there=1 << 1), dict(there=31), dict(opacity=bytes((1, 1)) + bytes(62)), dict(opacity=bytes((3, 2)) + bytes(62)),
+                        dict(opacity=bytes((3, 3)) + bytes(61)), dict(normals=bytes(3)), dict(id=bytes((3,)) + bytes(63)),
+                        dict(ids=struct.pack("<III", 2, 5, 5) + bytes(33)), dict(ids=struct.pack("<II", 65537, 5) + bytes(33)),
+                        dict(ids=bytes(40))):
+            self.setUp()
+            with self.assertRaises(Refused, msg=str(changed)):
+                Surface(Container(self.with_attributes(**changed)))
 
     def test_broken_rules(self):
         for chunk, layout, offset, value in (
@@ -118,6 +150,40 @@ class Tools(SurfaceCase):
                             ("--curve", "hilbert", "--colors", "all")):
                 with self.subTest(dims=dims, options=options):
                     self.compare(self.encode(self.path("in.raw"), "--dims", "%d,%d,%d" % dims, "--type", "rgba8", *options))
+
+    def test_attributes(self):
+        """Points with properties; what vox-decode writes as such again."""
+        noise = random.Random(2)
+        kinds = ("float x", "float y", "float z", "uchar red", "uchar green", "uchar blue", "uchar alpha", "float nx", "float ny",
+                 "float nz", "uchar roughness", "uchar metallic", "uint label")
+        for steps in (1, 9, 256):  # values that are all equal, that come again, and noise
+            lines = []
+            for _ in range(700):
+                value = lambda most: noise.randrange(steps) * most // max(steps - 1, 1)
+                lines.append(" ".join(map(str, [noise.randrange(40), noise.randrange(40), noise.randrange(9), value(255), value(255),
+                                                7, 1 + value(254), value(9) - 4, value(9) - 4, value(9) - 5, value(255), value(255),
+                                                value(4 * 10 ** 9)])))
+            write(self.path("in.ply"), "\n".join(["ply", "format ascii 1.0", "element vertex 700", *("property " + k for k in kinds),
+                                                  "end_header", *lines, ""]).encode())
+            for options in (("--codec", "raw"), ("--codec", "fws", "--weight-bits", "2"), (), ("--colors", "all", "--curve", "hilbert"),
+                            ("--attribute-threshold", "opacity=0,normal=0,rm=0", "--zstd", "3")):
+                with self.subTest(steps=steps, options=options):
+                    file = self.encode(self.path("in.ply"), "--resolution", "40", "--attributes", "color,opacity,normal,rm,id", *options)
+                    self.compare(file)
+                    self.run_program(os.path.join(BIN, "vox-decode"), file, "-f", "-o", self.path("out.ply"))
+                    data = read(self.path("out.ply"))
+                    points = list(struct.iter_unpack("<3f4B3f2BI", data[data.index(b"end_header\n") + 11:]))
+                    surface = Surface(Container(read(file)))
+                    code = lambda at: sum((at[a] >> i & 1) << 3 * i + a for i in range(6) for a in range(3))
+                    voxels = sorted(surface.walk(), key=lambda v: code(v[:3]))
+                    self.assertEqual(len(points), len(voxels))
+                    for point, (_, _, _, number) in zip(points, voxels):
+                        values = {name: all_of[number] for name, all_of in surface.attributes.items()}
+                        self.assertEqual(bytes(point[3:6]), bytes(surface.colors[number]))
+                        self.assertEqual((point[6:7], point[10:12]), (tuple(values["opacity"]), tuple(values["rm"])))
+                        self.assertEqual(point[12], struct.unpack("<I", values["id"])[0])
+                        for is_, was in zip(point[7:10], direction(values["normal"])):
+                            self.assertAlmostEqual(is_, was, places=6)
 
     def test_what_it_cannot_read_it_refuses(self):
         for codec in ("bc7", "jpeg", "jp2"):

@@ -58,6 +58,8 @@ KINDS = {
     "dagc octree": (["dagcolor-pack", "terrain:40", "--geometry", "octree"], "a.dagc", PACKED),
     "dagc palette": (["dagcolor-pack", "menger:2", "--codec", "palette"], "a.dagc", PACKED),
     "dagc pointer": (["dagcolor-pack", "menger:2", "--counts", "pointer", "--colors", "all"], "a.dagc", PACKED),
+    "dagc attributes": (["dagcolor-pack", "@points.ply", "--resolution", "8", "--attributes", "color,opacity,normal,rm,id"], "a.dagc",
+                        PACKED + [["vox-decode", "@", "-o", "out.ply", "-f"], ["vox-convert", "@", "-o", "out.dagc", "-f"]]),
     "nrrd": (["vox-convert", "membrane:20,12,8:1"], "a.nrrd", VOLUME),
     "nifti": (["vox-convert", "membrane:20,12,8:1"], "a.nii", VOLUME),
     "gzip": (["vox-convert", "membrane:20,12,8:1"], "a.nii.gz", VOLUME),
@@ -78,6 +80,15 @@ def few_colors():
     voxels = b"".join(colors[(x // 3 + y // 2 + z // 4) % 4] for z in range(24) for y in range(30) for x in range(40))
     return b"NRRD0005\ntype: uint8\ndimension: 4\nsizes: 3 40 30 24\nkinds: RGB-color domain domain domain\n" \
         b"encoding: raw\n\n" + voxels
+
+
+def points():
+    """Points with all that voxels may have beside colours, but light, as a PLY file."""
+    properties = "float x,float y,float z,uchar red,uchar green,uchar blue,uchar alpha,float nx,float ny,float nz,uchar roughness," \
+        "uchar metallic,uint label"
+    head = "ply\nformat ascii 1.0\nelement vertex 64\n" + "".join(f"property {p}\n" for p in properties.split(",")) + "end_header\n"
+    return (head + "".join(f"{i % 8} {i // 8} {i % 5} {i * 4} {255 - i} {i} {i * 3 + 60} {i % 3 - 1} {i % 7 - 3} 1 {i} {i * 2} {i // 9}\n"
+                           for i in range(64))).encode()
 
 
 def dicom():
@@ -209,6 +220,7 @@ def main():
         folder = pathlib.Path(name)
         subprocess.run([options.bin / "dagcolor-pack", "menger:2", "-o", folder / "menger.dagc", "-q"], check=True)
         (folder / "few.nrrd").write_bytes(few_colors())
+        (folder / "points.ply").write_bytes(points())
         for kind, (make, file, programs) in KINDS.items():
             if options.kind not in (None, kind):
                 continue

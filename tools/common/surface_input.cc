@@ -15,6 +15,7 @@
 #include "libcolor/surface/voxel_list.h"
 #include "libcolor/surface/voxelise.h"
 #include "libcolor/terrain/terrain.h"
+#include "tools/common/attributes.h"
 
 namespace voxkit::cli {
 namespace {
@@ -137,7 +138,9 @@ Surface open_any(const std::string& name, const SurfaceOptions& options, Context
 }  // namespace
 
 Surface open_surface(const std::string& name, const SurfaceOptions& options, Context& ctx) {
-  return named(open_any(name, options, ctx), name);
+  Surface surface = named(open_any(name, options, ctx), name);
+  if (!surface) return surface;
+  return with_wanted(std::move(*surface), options.attributes, name);
 }
 
 Surface open_surfaces(std::span<const PlacedInput> inputs, const SurfaceOptions& options, Context& ctx) {
@@ -181,8 +184,10 @@ Surface open_surfaces(std::span<const PlacedInput> inputs, const SurfaceOptions&
     for (std::string& note : mesh.notes) note = prefix_of(*input) + note;
     meshes.push_back(std::move(mesh));
   }
-  return named(joined(std::move(clouds), std::move(meshes), options, ctx),
-               inputs.size() == 1 ? first.name : "");
+  const std::string name = inputs.size() == 1 ? first.name : "";
+  Surface surface = named(joined(std::move(clouds), std::move(meshes), options, ctx), name);
+  if (!surface) return surface;
+  return with_wanted(std::move(*surface), options.attributes, name);
 }
 
 }  // namespace voxkit::cli

@@ -13,6 +13,8 @@
 #include "libcolor/faces/surface_faces.h"
 #include "libcolor/palette/palette.h"
 #include "libcolor/surface/morton.h"
+#include "libcolor/surface/octahedral.h"
+#include "tools/common/attributes.h"
 
 namespace voxkit::cli {
 namespace {
@@ -44,6 +46,7 @@ class Part {
     info_.dims = box.size();
   }
   const VolumeInfo& info() const { return info_; }
+  color::AttributeSet attributes() const { return level_.attributes(); }
   const Box& box() const { return box_; }
   Status each(const color::SurfaceSource::Sink& sink, Context& ctx) const { return each(box_, sink, ctx); }
   /// Those in a box of the level.
@@ -61,15 +64,57 @@ class Part {
   VolumeInfo info_;
 };
 
+/// What points have beside colours, as properties of a file and as its bytes.
+class Properties {
+ public:
+  explicit Properties(color::AttributeSet set) : set_(set) {
+    const auto bytes = [&](std::initializer_list<const char*> names) {
+      for (const char* const name : names) list_.push_back({name, "uchar", 1});
+    };
+    if (set.has(color::Attribute::emissive)) bytes({"emissive_red", "emissive_green", "emissive_blue"});
+    if (set.has(color::Attribute::opacity)) bytes({"alpha"});
+    if (set.has(color::Attribute::normal))
+      for (const char* const name : {"nx", "ny", "nz"}) list_.push_back({name, "float", 4});
+    if (set.has(color::Attribute::rm)) bytes({"roughness", "metallic"});
+    if (set.has(color::Attribute::id)) list_.push_back({"label", "uint", 4});
+  }
+  const std::vector<PlyProperty>& list() const { return list_; }
+
+  /// Appends those of a voxel of a run. Only normals are not as they are stored.
+  void append(const color::VoxelRun& run, size_t i, std::vector<std::byte>& out) const {
+    const auto own = run.attributes.subspan(i * set_.bytes(), set_.bytes());
+    if (!set_.has(color::Attribute::normal)) {
+      out.insert(out.end(), own.begin(), own.end());
+      return;
+    }
+    const size_t at = set_.offset(color::Attribute::normal);
+    const auto direction =
+        color::direction_of({std::to_integer<uint8_t>(own[at]), std::to_integer<uint8_t>(own[at + 1])});
+    const auto floats = std::as_bytes(std::span(direction));
+    out.insert(out.end(), own.begin(), own.begin() + static_cast<std::ptrdiff_t>(at));
+    out.insert(out.end(), floats.begin(), floats.end());
+    out.insert(out.end(), own.begin() + static_cast<std::ptrdiff_t>(at) + 2, own.end());
+  }
+
+ private:
+  color::AttributeSet set_;
+  std::vector<PlyProperty> list_;
+};
+
 Status write_points(const Part& part, uint64_t count, const std::string& name, bool force, Context& ctx) {
   const VolumeInfo& info = part.info();
   const bool doubles = needs_doubles(info);
-  VOX_TRY(auto writer, PlyPointWriter::create(name, count, doubles, force));
+  const Properties properties(part.attributes());
+  VOX_TRY(auto writer, PlyPointWriter::create(name, count, doubles, force, properties.list()));
   std::vector<ColoredPoint> points;
+  std::vector<std::byte> more;
   VOX_CHECK(part.each(
-      [&](Voxels voxels) -> Status {
+      [&](const color::VoxelRun& run) -> Status {
         points.clear();
-        for (const color::SurfaceVoxel& voxel : voxels) {
+        more.clear();
+        for (size_t i = 0; i < run.voxels.size(); ++i) {
+          const color::SurfaceVoxel& voxel = run.voxels[i];
+          properties.append(run, i, more);
           const auto at = part.place(voxel);
           const Affine::Vector place = info.affine.place(
               {static_cast<double>(at[0]), static_cast<double>(at[1]), static_cast<double>(at[2])});
@@ -77,7 +122,7 @@ Status write_points(const Part& part, uint64_t count, const std::string& name, b
           point.at = {place[0], place[1], place[2]};
           point.color = {voxel.color.r, voxel.color.g, voxel.color.b};
         }
-        return writer.add(points);
+        return writer.add(points, more);
       },
       ctx));
   return writer.finish();
@@ -178,9 +223,12 @@ Result<SurfaceCount> write_surface(const color::Level& level, const SurfaceOutpu
   const Part part(level, what.box);
   SurfaceCount count;
   VOX_TRY(count.voxels, level.count(what.box));
+  const bool points = has_ending(name, ".ply");
+  if (const color::AttributeSet set = level.attributes(); !points && !set.empty())
+    ctx.note(fmt::format("{}: dropped: {}: points (.ply) have all attributes", name, names_of(set)));
   if (is_face_output(name)) {
     VOX_CHECK(write_mesh(part, what.enclosed, count, name, force, ctx));
-  } else if (has_ending(name, ".ply")) {
+  } else if (points) {
     VOX_CHECK(write_points(part, count.voxels, name, force, ctx));
   } else if (has_ending(name, ".vdb")) {
     VOX_CHECK(write_grid(part, name, force, ctx));

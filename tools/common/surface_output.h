@@ -27,7 +27,8 @@ struct SurfaceCount {
 };
 
 /// Writes the voxels of a level of a surface that are in a box. As .ply: points where their centres are, as
-/// doubles where floats cannot tell them apart. As .vdb: the active voxels of a Vec3s grid. As .vox: models;
+/// doubles where floats cannot tell them apart, with all attributes as properties; other files have none, and
+/// ctx.note says which are dropped. As .vdb: the active voxels of a Vec3s grid. As .vox: models;
 /// where there are more than 255 colours, each becomes the nearest of a palette. As .glb and .obj: their
 /// faces toward void and the sides of the box, merged into rectangles, and the voxels that have none as
 /// points.

@@ -5,8 +5,8 @@
 #include "formats/output_file.h"
 #include "formats/parallel.h"
 #include "formats/reservation.h"
+#include "libcolor/edit/levels.h"
 #include "libcolor/layout.h"
-#include "libcolor/surface/volume_surface.h"
 #include "tools/common/input.h"
 
 namespace voxkit::cli {
@@ -86,7 +86,7 @@ Result<TiledSurface> open_tiled(const std::string& name, const std::string& patt
               },
               color::tile_work_bytes(format), *ctx.memory));
   TiledSurface surface;
-  VOX_TRY(surface.source, color::surface_of(color::open_source(recolored)));
+  surface.source = color::surface_of(recolored);
   if (same_order(tiles.params, options))
     surface.stored = [tiles, options](uint64_t part, uint32_t) {
       return tiles.with(part, [&](std::span<const std::byte> file, uint32_t colors) {
