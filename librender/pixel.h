@@ -25,6 +25,12 @@ struct PixelTraits {
   float rm[2] = {};      ///< roughness and metalness, 0..1
   uint32_t id = 0;
 };
+/// A cell that a ray sees, where it may see several: of surfaces with levels of detail.
+struct Glimpse {
+  int32_t voxel[3];  ///< one of it
+  int16_t log2_edge;
+  int16_t ninths;  ///< of the pixel, that it hides; 0: there are no more of them
+};
 /// What it cost, beside its cells: blocks entered, bytes of links and values looked at.
 struct PixelCost {
   uint32_t blocks, bytes;

@@ -2,6 +2,7 @@
 #include "libcolor/store.h"
 #include "librender/cast/cast_tile.h"
 #include "librender/cast/cast_translucent.h"
+#include "librender/cast/glimpses.h"
 #include "librender/cast/surface_colors.h"
 #include "librender/cast/surface_traits.h"
 
@@ -15,25 +16,31 @@ Status cast(const DagGrid& grid, const Camera& camera, const CastOptions& option
   if (options.traversal == Traversal::baseline) return only_dense_has_baseline();
   const color::Volume& volume = grid.volume();
   VOX_TRY(const color::DagView* const dag, volume.store().dag(volume.container(), volume.params()));
-  VOX_TRY(const CastParams params, cast_params(grid.info(), camera, options));
   CastOptions detailed = options;
   detailed.details = true;  // where to look colours up
   if (volume.params().attributes.has(color::Attribute::opacity)) {
+    VOX_TRY(const CastParams params, cast_params(grid.info(), camera, options));
     VOX_CHECK(cast_translucent(volume, *dag, params, detailed, frame, ctx));
     if (!options.details) frame.details.clear();
     return {};
   }
+  VOX_TRY(CastParams params, surface_params(volume, camera, options));
+  VOX_TRY(const std::unique_ptr<Buffer> glimpses, hold_glimpses(params, ctx));
+  params.glimpses = glimpses_in(glimpses);
   if (options.traversal == Traversal::restart) {
     VOX_CHECK(cast_with(DagCastView<Search::restart>{dag}, params, detailed, frame, ctx));
-  } else if (params.cone > 0 || !options.skip) {
+  } else if (!options.skip) {
     VOX_CHECK(cast_with(DagCastView<Search::path>{dag}, params, detailed, frame, ctx));
   } else {
     VOX_TRY(const std::shared_ptr<VoidMemo> memo, grid.learned().memo({}, ctx));
-    const BoxedView<DagSpace> boxed{{{dag}}, &params, memo.get(), least_log2(grid.info(), camera, options)};
-    VOX_CHECK(cast_with(boxed, params, detailed, frame, ctx));
+    const int least = least_log2(grid.info(), camera, options);
+    const BoxedView<DagSpace> all{{{dag}}, &params, memo.get(), least};
+    const BoxedView<DagSpace, true> levels{{{dag}}, &params, memo.get(), least};
+    VOX_CHECK(glimpses ? cast_with(levels, params, detailed, frame, ctx)
+                       : cast_with(all, params, detailed, frame, ctx));
   }
   VOX_CHECK(look_up_traits(volume, options.traits, true, frame, ctx));
-  VOX_CHECK(look_up_colors(volume, frame, ctx));
+  VOX_CHECK(look_up_colors(volume, params.glimpses, frame, ctx));
   if (!options.details) frame.details.clear();
   return {};
 }

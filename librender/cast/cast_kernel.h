@@ -5,6 +5,7 @@
 #include <cmath>
 #include <type_traits>
 
+#include "librender/cast/beam.h"
 #include "librender/cast/grid.h"
 #include "librender/cast/opacity.h"
 #include "librender/cast/ray.h"
@@ -23,8 +24,10 @@ struct CastParams {
   double pixel;                          ///< width of a pixel at distance 1 along the axis
   double edge;                           ///< smallest edge of a voxel, world units
   double cone;                           ///< width of a pixel at distance 1 in voxels; 0: all detail
+  int coarsest;                          ///< log2 of the edge of the coarsest cells that are fine enough
   bool skip;                             ///< step over cells, not voxels
   ColorOf color_of;
+  Glimpse* glimpses = nullptr;  ///< of surfaces, unless cone is 0: Beam::most_cells a pixel
 };
 constexpr float opaque = 0.995f;
 
@@ -61,6 +64,11 @@ VOX_HD_HOT void found(const uint32_t (&voxel)[3], double distance, Pixel& pixel,
   for (int a = 0; a < 3; ++a) detail.voxel[a] = static_cast<int32_t>(voxel[a]);
 }
 
+/// Voxels as wide as a cone, or less, are fine enough: floor(log2(width)); all detail, -1, below 2.
+VOX_HD_HOT int finest_log2(double width) {
+  return width >= 2 ? static_cast<int>(std::bit_cast<uint64_t>(width) >> 52) - 1023 : -1;
+}
+
 /// Follows a ray over the cells of a grid, from the voxel that it is in. Nothing was found so far.
 template <class Cursor>
 VOX_HD_HOT void follow(const CastParams& params, GridRay& ray, Cursor& cursor, int x, int y, Pixel& pixel,
@@ -68,9 +76,7 @@ VOX_HD_HOT void follow(const CastParams& params, GridRay& ray, Cursor& cursor, i
   const double length = world_length(params, x, y);
   const double cone = params.cone * length;
   for (bool inside = true; inside;) {
-    // Voxels as wide as the cone, or less, are fine enough: floor(log2(width)).
-    const double width = cone * ray.t();
-    const int finest = width >= 2 ? static_cast<int>(std::bit_cast<uint64_t>(width) >> 52) - 1023 : -1;
+    const int finest = finest_log2(cone * ray.t());
     const uint32_t voxel[3] = {ray.voxel(0), ray.voxel(1), ray.voxel(2)};
     const auto cell = cursor.locate(voxel[0], voxel[1], voxel[2], finest);
     ++detail.cells;
@@ -85,6 +91,48 @@ VOX_HD_HOT void follow(const CastParams& params, GridRay& ray, Cursor& cursor, i
     if (blend(color, (ray.t() - entered) * length / params.edge, pixel)) break;
   }
 }
+
+/// Follows the ray through a pixel of a surface with levels of detail, from the voxel that it is in. Cells
+/// that are fine enough hide a part of the pixel; what they are goes to its glimpses.
+template <class Cursor>
+VOX_HD_HOT void follow_levels(const CastParams& params, GridRay& ray, Cursor& cursor, int x, int y,
+                              Pixel& pixel, PixelDetail& detail) {
+  const double length = world_length(params, x, y);
+  const double cone = params.cone * length;
+  Glimpse* glimpse = params.glimpses + (int64_t{y} * params.width + x) * Beam::most_cells;
+  Glimpse* const end = glimpse + Beam::most_cells;
+  Beam beam(params.origin, ray_through(params, x, y).direction);
+  bool clear = true;  // nothing was found, or hardly anything
+  for (bool inside = true; inside;) {
+    const uint32_t voxel[3] = {ray.voxel(0), ray.voxel(1), ray.voxel(2)};
+    const auto& cell = cursor.locate(voxel[0], voxel[1], voxel[2], finest_log2(cone * ray.t()));
+    ++detail.cells;
+    if (params.color_of.is_void(cell.value)) {
+      inside = cell.leave(ray);
+      continue;
+    }
+    const int log2_edge = static_cast<int>(cell.value.template as<uint32_t>() & 0xff);
+    double t = ray.t();
+    const int ninths = log2_edge == 0 ? beam.hide_all() : beam.hide(cursor.parts(cell), voxel, log2_edge, t);
+    if (ninths > 0) {
+      constexpr int significant = 3;
+      if (clear && (detail.voxel[0] < 0 || ninths >= significant)) found(voxel, t * length, pixel, detail);
+      clear &= ninths < significant;
+      *glimpse = {{}, static_cast<int16_t>(log2_edge), static_cast<int16_t>(ninths)};
+      for (int a = 0; a < 3; ++a) glimpse->voxel[a] = static_cast<int32_t>(voxel[a]);
+      ++glimpse;
+    }
+    if (beam.open() == 0) break;
+    inside = ray.leave(log2_edge);
+  }
+  pixel.color[3] = static_cast<float>(9 - beam.open()) * (1.0f / 9);
+  for (; glimpse < end; ++glimpse) glimpse->ninths = 0;
+}
+/// Cursors that have parts of cells.
+template <class Cursor>
+concept HasParts = requires {
+  &Cursor::parts;
+};
 
 /// Algorithm 1 of the thesis as it is published: floats, accumulated from voxel to voxel.
 VOX_HD_HOT void follow_baseline(const CastParams& params, DenseView::Cursor& cursor, int x, int y,
@@ -151,6 +199,9 @@ VOX_HD_HOT void cast_ray(const CastParams& params, Cursor& cursor, int x, int y,
   } else {
     GridRay ray(params.start, ray_through(params, x, y).direction);
     if (!ray.enter()) return;
+    if constexpr (HasParts<Cursor>) {
+      if (params.glimpses != nullptr) return follow_levels(params, ray, cursor, x, y, pixel, detail);
+    }
     follow(params, ray, cursor, x, y, pixel, detail);
   }
 }

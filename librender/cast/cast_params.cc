@@ -65,13 +65,17 @@ Result<CastParams> cast_params(const VolumeInfo& info, const Camera& camera, con
       .pixel = rays.pixel_width(),
       .edge = transform.smallest_edge(),
       .cone = 0,
+      .coarsest = -1,
       .skip = options.skip,
       .color_of = ColorOf(info.format, options.range),
   };
   // Where not even the farthest corner is two voxels to a pixel, every ray sees all detail.
   const double farthest = glm::length(rays.eye()) + transform.radius();
   const double cone = params.pixel / params.edge;
-  if (options.level_of_detail && cone * farthest >= 2) params.cone = cone;
+  if (options.level_of_detail && cone * farthest >= 2) {
+    params.cone = cone;
+    params.coarsest = finest_log2(cone * farthest);
+  }
   bound_pixels(rays, transform, params);
   return params;
 }

@@ -39,27 +39,32 @@ template <int width, int height, class Cursor, class Keep>
       keep(pixel_x, pixel_y, pixel, detail);
       continue;
     }
-    const BoxedCell* cell = nullptr;
+    constexpr bool levels = HasParts<Cursor>;
+    const double cone = levels ? params.cone * world_length(params, pixel_x, pixel_y) : 0;
+    const typename Cursor::Boxed* cell = nullptr;
     uint32_t voxel[3] = {};
     while (rays.moving(i)) {
       for (int a = 0; a < 3; ++a) voxel[a] = mirror.voxel(a, rays.voxel(i, a));
-      cell = &cursor.locate(voxel[0], voxel[1], voxel[2], -1);
-      if (!cell->is_void) break;
+      cell = &cursor.locate(voxel[0], voxel[1], voxel[2], levels ? finest_log2(cone * rays.t(i)) : -1);
+      if (!cell->is_void_to_all()) break;
       const Mirror::Box box = mirror(cell->box.lo, cell->box.hi);
       trail.add(box);
       rays.leave(box);
     }
     detail.cells = rays.passed(i);
     if (!rays.gone(i)) {
-      if (rays.moving(i) && cell->color.alpha >= 1) {
+      if (!levels && rays.moving(i) && cell->color.alpha >= 1) {
         ++detail.cells;
         found(voxel, rays.t(i) * world_length(params, pixel_x, pixel_y), pixel, detail);
         blend(cell->color, 0, pixel);
-      } else {  // through what is translucent, or where doubles do not suffice
+      } else {  // through what is translucent or coarse, or where doubles do not suffice
         for (int a = 0; a < 3; ++a) voxel[a] = mirror.voxel(a, rays.voxel(i, a));
         GridRay ray(params.start, ray_through(params, pixel_x, pixel_y).direction);
         ray.resume(rays.t(i), voxel);
-        follow(params, ray, cursor, pixel_x, pixel_y, pixel, detail);
+        if constexpr (levels)
+          follow_levels(params, ray, cursor, pixel_x, pixel_y, pixel, detail);
+        else
+          follow(params, ray, cursor, pixel_x, pixel_y, pixel, detail);
       }
     }
     keep(pixel_x, pixel_y, pixel, detail);
@@ -68,8 +73,8 @@ template <int width, int height, class Cursor, class Keep>
 
 template <class View>
 inline constexpr bool has_boxes = false;
-template <class Space>
-inline constexpr bool has_boxes<BoxedView<Space>> = true;
+template <class Space, bool levels>
+inline constexpr bool has_boxes<BoxedView<Space, levels>> = true;
 
 /// The pixels of a tile: a cursor goes on where the last ray ended. `details` may be null. Packets are 2 x
 /// `packet_height` pixels.

@@ -7,6 +7,7 @@
 
 #include "libcolor/color.h"
 #include "libcolor/dag/dag_view.h"
+#include "libcolor/dag/node_parts.h"
 #include "librender/cast/grid.h"
 
 namespace voxkit::render {
@@ -23,9 +24,8 @@ struct DagCastView {
       if (dag_.height == color::leaf_height) leaf_ = dag_.leaf(dag_.root);
     }
     /// The value of a cell that is not void is its height, opaque. `finest`: cells of edge 2^finest are fine
-    /// enough, where nodes have colours.
+    /// enough, and leaf words where that is 1 and more; -1: all detail.
     VOX_HD_HOT Cell locate(uint32_t x, uint32_t y, uint32_t z, int finest) {
-      if (dag_.colors != color::Colors::all) finest = -1;
       const uint32_t apart = (x ^ x_) | (y ^ y_) | (z ^ z_);
       // Nodes of this height and above are those of the last voxel.
       int h = search == Search::restart ? dag_.height : static_cast<int>(std::bit_width(apart));
@@ -47,14 +47,18 @@ struct DagCastView {
       if (lowest_ != color::leaf_height) leaf_ = dag_.leaf(pointer(color::leaf_height));
       lowest_ = color::leaf_height;
       const uint64_t leaf = leaf_;
-      if (finest >= color::leaf_height && leaf != 0)
-        return {opaque_cell(color::leaf_height), color::leaf_height};
+      if (finest > 0 && leaf != 0) return {opaque_cell(color::leaf_height), color::leaf_height};
       const uint32_t octant = (x >> 1 & 1) | (y & 2) | (z & 2) << 1;
       const auto eight = static_cast<uint32_t>(leaf >> 8 * octant & 0xff);
       if (eight == 0) return {{}, leaf == 0 ? color::leaf_height : 1};
-      if (finest == 1) return {opaque_cell(1), 1};
       const uint32_t bit = (x & 1) | (y & 1) << 1 | (z & 1) << 2;
       return {(eight >> bit & 1) != 0 ? opaque_cell(0) : Voxel{}, 0};
+    }
+    /// Which parts hold voxels of the cell that was located last, coarser than voxels, and not void.
+    VOX_HD_HOT uint64_t parts(const Cell& cell) const {
+      const int h = cell.log2_edge;
+      return h == color::leaf_height ? leaf_
+                                     : color::node_parts(dag_, h, pointers_[search == Search::path ? h : 0]);
     }
     /// Nodes entered, and bytes of them looked at.
     VOX_HD_HOT uint32_t blocks() const { return nodes_; }

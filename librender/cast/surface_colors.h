@@ -8,8 +8,9 @@
 
 namespace voxkit::render {
 
-/// Gives each pixel of a picture by DagCastView, with details, the colour of the cell that its ray hit. Adds
-/// its time to `frame`. ErrorCode::input where colours are damaged.
-Status look_up_colors(const color::Volume& volume, Frame& frame, Context& ctx);
+/// Gives each pixel of a picture by DagCastView, with details, the colour of the cell that its ray hit; or,
+/// unless `glimpses` is null, those of the cells that it saw. Adds its time to `frame`. ErrorCode::input
+/// where colours are damaged.
+Status look_up_colors(const color::Volume& volume, const Glimpse* glimpses, Frame& frame, Context& ctx);
 
 }  // namespace voxkit::render

@@ -56,10 +56,23 @@ struct BoxedCell {
   bool is_void;
   Color color;  ///< unless it is void
   [[gnu::always_inline]] bool leave(GridRay& ray) const { return ray.leave(box.lo, box.hi); }
-  [[gnu::always_inline]] bool holds(const uint32_t (&v)[3]) const {
+  [[gnu::always_inline]] bool holds(const uint32_t (&v)[3], int) const {
     return ((v[0] - box.lo[0] < box.hi[0] - box.lo[0]) & (v[1] - box.lo[1] < box.hi[1] - box.lo[1]) &
             (v[2] - box.lo[2] < box.hi[2] - box.lo[2])) != 0;
   }
+  /// Whether it is void to all rays that come there.
+  [[gnu::always_inline]] bool is_void_to_all() const { return is_void; }
+};
+/// The same with levels of detail. A ray for which coarser cells are fine enough may see a voxel beside a
+/// void cell in the cell around both.
+struct LevelCell : BoxedCell {
+  int level;       ///< void: the greatest `finest` that it is void to; else the one that it is there for
+  bool grown;      ///< a void box that is void to all
+  uint64_t parts;  ///< of one that is not void, nor a voxel
+  [[gnu::always_inline]] bool holds(const uint32_t (&v)[3], int finest) const {
+    return BoxedCell::holds(v, finest) && (is_void ? finest <= level : finest == level);
+  }
+  [[gnu::always_inline]] bool is_void_to_all() const { return is_void && grown; }
 };
 
 /// SVMM files as what boxes are grown in.
@@ -95,8 +108,9 @@ struct MaskSpace {
   auto search() const { return MaskVoidSearch(*view.tree, 1024); }
 };
 
-/// A compressed volume on the host, searched along a path from the root, with all detail.
-template <class Space>
+/// A compressed volume on the host, searched along a path from the root; with all detail, or of surfaces with
+/// levels of it.
+template <class Space, bool levels = false>
 struct BoxedView {
   Space space;
   const CastParams* params;
@@ -106,11 +120,13 @@ struct BoxedView {
   class Cursor {
    public:
     explicit Cursor(const BoxedView& volume) : volume_(volume), walk_(volume.space.walk()) {}
-    [[gnu::always_inline]] const BoxedCell& locate(uint32_t x, uint32_t y, uint32_t z, int) {
+    using Boxed = std::conditional_t<levels, LevelCell, BoxedCell>;
+    [[gnu::always_inline]] const Boxed& locate(uint32_t x, uint32_t y, uint32_t z, int finest) {
       const uint32_t v[3] = {x, y, z};
-      BoxedCell& known = recent_[(x + y * 11 + z * 57) % remembered];
-      if (known.holds(v)) return known;
-      const Cell cell = walk_.locate(x, y, z, -1);
+      const int shift = levels && finest > 0 ? finest : 0;
+      Boxed& known = recent_[((x >> shift) + (y >> shift) * 11 + (z >> shift) * 57) % remembered];
+      if (known.holds(v, finest)) return known;
+      const Cell cell = walk_.locate(x, y, z, levels ? finest : -1);
       known.value = cell.value;
       for (int a = 0; a < 3; ++a) {
         known.box.lo[a] = v[a] >> cell.log2_edge << cell.log2_edge;
@@ -119,29 +135,57 @@ struct BoxedView {
       }
       const ColorOf& color_of = volume_.params->color_of;
       known.is_void = color_of.is_void(cell.value);
+      if constexpr (levels) {
+        known.level = known.is_void ? cell.log2_edge : finest;
+        known.grown = false;
+        if (!known.is_void && cell.log2_edge > 0) known.parts = walk_.parts(cell);
+      }
       if (!known.is_void)
         known.color = color_of(cell.value);
       else if (cell.log2_edge >= volume_.least_log2)
         grow_cell(cell.log2_edge, known);
       return known;
     }
+    uint64_t parts(const LevelCell& cell) const requires levels { return cell.parts; }
     uint32_t blocks() const { return walk_.blocks(); }
     uint32_t bytes() const { return walk_.bytes(); }
 
    private:
     /// Makes a void cell a box.
-    [[gnu::noinline]] void grow_cell(int log2_edge, BoxedCell& known) {
-      const VoidMemo::Key key{{known.box.lo[0], known.box.lo[1], known.box.lo[2]}, log2_edge};
-      if (volume_.memo->find(key, known.box)) return;
-      auto search = volume_.space.search();
-      known.box = grow(known.box, volume_.params->dims, search);
-      volume_.memo->insert(key, known.box);
+    [[gnu::noinline]] void grow_cell(int log2_edge, Boxed& known) {
+      const VoidBox cell = known.box;
+      const VoidMemo::Key key{{cell.lo[0], cell.lo[1], cell.lo[2]}, log2_edge};
+      if (!volume_.memo->find(key, known.box)) {
+        auto search = volume_.space.search();
+        known.box = grow(known.box, volume_.params->dims, search);
+        volume_.memo->insert(key, known.box);
+      }
+      if constexpr (levels) {
+        known.grown = cut(volume_.params->coarsest, cell, known.box);
+        if (known.grown)
+          known.level = 64;
+        else
+          known.box = cell;
+      }
+    }
+    /// Cuts a box to whole cells of edge 2^log2_edge. Whether these are around a cell.
+    bool cut(int log2_edge, const VoidBox& cell, VoidBox& box) const {
+      const uint64_t within = (uint64_t{1} << log2_edge) - 1;
+      bool around = true;
+      for (int a = 0; a < 3; ++a) {
+        const uint64_t lo = (box.lo[a] + within) & ~within;
+        const uint64_t hi = box.hi[a] == volume_.params->dims[a] ? box.hi[a] : box.hi[a] & ~within;
+        around &= lo <= cell.lo[a] && hi >= cell.hi[a];
+        box.lo[a] = static_cast<uint32_t>(lo);
+        box.hi[a] = static_cast<uint32_t>(hi);
+      }
+      return around;
     }
 
     const BoxedView& volume_;
     typename Space::Walk walk_;
     static constexpr uint32_t remembered = 128;
-    BoxedCell recent_[remembered] = {};  ///< cells of neighbouring voxels, which neighbouring rays meet
+    Boxed recent_[remembered] = {};  ///< cells of neighbouring voxels, which neighbouring rays meet
   };
   Cursor cursor() const { return Cursor(*this); }
 };

@@ -3,7 +3,7 @@
 #include <vector>
 
 #include "libcolor/store.h"
-#include "librender/cast/cast_params.h"
+#include "librender/cast/glimpses.h"
 #include "librender/cast/surface_colors.h"
 #include "librender/cast/surface_traits.h"
 #include "librender/device/backend_run.h"
@@ -27,8 +27,12 @@ class Grid : public DeviceGrid {
   Status cast_with(const View& view, const Camera& camera, const CastOptions& options, Frame& frame,
                    Context& ctx) const {
     VOX_TRY(const CastParams params, cast_params(info_, camera, options));
+    return cast_with(view, params, frame, ctx);
+  }
+  template <class View>
+  Status cast_with(const View& view, const CastParams& params, Frame& frame, Context& ctx) const {
     VOX_CHECK(
-        frame.begin({.width = options.width, .height = options.height, .details = true, .costs = true}, ctx));
+        frame.begin({.width = params.width, .height = params.height, .details = true, .costs = true}, ctx));
     const std::lock_guard lock(buffers_.mutex);
     VOX_CHECK(buffers_.reserve(*backend_, frame.rays, ctx));
     const PixelKernel<View> kernel{params, view, buffers_.pixels.data(), buffers_.details.data(),
@@ -121,11 +125,21 @@ class Dag final : public Grid {
   }
   Status cast(const Camera& camera, const CastOptions& options, Frame& frame, Context& ctx) const override {
     if (options.traversal == Traversal::baseline) return only_dense_has_baseline();
+    VOX_TRY(CastParams params, surface_params(grid_.volume(), camera, options));
+    VOX_TRY(const std::unique_ptr<Buffer> buffer, hold_glimpses(params, ctx));
+    Glimpse* const glimpses = glimpses_in(buffer);
+    DeviceArray<Glimpse> written;
+    if (buffer) {
+      VOX_CHECK(backend().reserve(written, glimpse_count(params), "what pixels see of coarse cells", ctx));
+      params.glimpses = written.data();
+    }
     VOX_CHECK(options.traversal == Traversal::restart
-                  ? cast_with(DagCastView<Search::restart>{view_.data()}, camera, options, frame, ctx)
-                  : cast_with(DagCastView<Search::path>{view_.data()}, camera, options, frame, ctx));
+                  ? cast_with(DagCastView<Search::restart>{view_.data()}, params, frame, ctx)
+                  : cast_with(DagCastView<Search::path>{view_.data()}, params, frame, ctx));
+    if (buffer)
+      VOX_CHECK(backend().download(written, 0, std::span<Glimpse>(glimpses, glimpse_count(params))));
     VOX_CHECK(look_up_traits(grid_.volume(), options.traits, true, frame, ctx));
-    VOX_CHECK(look_up_colors(grid_.volume(), frame, ctx));
+    VOX_CHECK(look_up_colors(grid_.volume(), glimpses, frame, ctx));
     if (!options.details) frame.details.clear();
     return {};
   }

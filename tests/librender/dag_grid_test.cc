@@ -95,60 +95,128 @@ TEST(DagGrid, PicturesAreThoseOfTheVoxels) {
     }
 }
 
-/// Far away a ray ends at the first node that is as small as a pixel, and sees its colour.
-TEST(DagGrid, LevelsOfDetail) {
-  Fixture f;
-  color::Options settings;
-  settings.colors = color::Colors::all;
-  ListSource source(color::sphere_shell(7), Index3(128));
-  auto bytes = std::make_shared<std::vector<std::byte>>(color::compressed(source, settings));
-  auto container = Container::open(*bytes, "file", bytes);
-  ASSERT_TRUE(container);
-  const auto volume = color::Volume::open(*container);
-  ASSERT_TRUE(volume);
-  const DagGrid grid(*volume);
+Result<std::shared_ptr<const color::Volume>> with_colors_of_nodes(const color::Voxels& voxels, Index3 dims) {
+  color::Options options;
+  options.colors = color::Colors::all;
+  options.codec = color::ColorCodec::raw;
+  ListSource source(voxels, dims);
+  const auto bytes = std::make_shared<const std::vector<std::byte>>(color::compressed(source, options));
+  VOX_TRY(auto container, Container::open(*bytes, "file", bytes));
+  return color::Volume::open(container);
+}
+color::Voxels foliage() {  // of seven colours, with holes
+  return color::voxels_where(
+      7, [](uint32_t x, uint32_t y, uint32_t z) { return (x * 37 + y * 11 + z * z * 5) % 61 == 0; });
+}
+CastOptions square(int side) {
   CastOptions options;
-  options.width = options.height = 64;
+  options.width = options.height = side;
   options.details = true;
-  // Close up voxels are larger than pixels.
-  Frame all, some;
-  ASSERT_TRUE(cast(grid, Camera::orbit(30, 20, 0.6, 20), options, all, f.ctx));
-  options.level_of_detail = true;
-  ASSERT_TRUE(cast(grid, Camera::orbit(30, 20, 0.6, 20), options, some, f.ctx));
-  for (size_t i = 0; i < all.pixels.size(); ++i)
-    for (int k = 0; k < 4; ++k) ASSERT_EQ(all.pixels[i].color[k], some.pixels[i].color[k]);
-  // From afar each pixel has the colour of a node around the voxel, as large as the cone there or half of it.
-  const Camera far = Camera::orbit(30, 20, 12, 45);
-  for (const Traversal traversal : {Traversal::path, Traversal::restart}) {
-    options.traversal = traversal;
-    ASSERT_TRUE(cast(grid, far, options, some, f.ctx));
-    EXPECT_GT(some.rays_hit, 0u);
-    const auto dag = (*volume)->store().dag((*volume)->container(), (*volume)->params());
-    ASSERT_TRUE(dag);
-    bool coarse = false;
-    for (size_t i = 0; i < some.pixels.size(); ++i) {
-      const int32_t(&v)[3] = some.details[i].voxel;
-      if (v[0] < 0) continue;
-      const uint64_t place = color::morton_code(static_cast<uint32_t>(v[0]), static_cast<uint32_t>(v[1]),
-                                                static_cast<uint32_t>(v[2]));
-      bool found = false;
-      for (int h = 0; h <= 7; ++h) {
-        const color::Found cell = color::find_cell(**dag, place, h);
-        if (!cell.there) continue;
-        const color::Rgb c = *(*volume)->color(cell.color);
-        const bool same = std::abs(some.pixels[i].color[0] * 255 - c.r) < 0.01f &&
-                          std::abs(some.pixels[i].color[1] * 255 - c.g) < 0.01f &&
-                          std::abs(some.pixels[i].color[2] * 255 - c.b) < 0.01f;
-        found |= same;
-        coarse |= same && h > 2;
-      }
-      EXPECT_TRUE(found);
-    }
-    EXPECT_TRUE(coarse);
+  return options;
+}
+
+/// Close up, where voxels are larger than pixels, and where nodes have no colours, levels of detail change
+/// nothing.
+TEST(DagGrid, LevelsOfDetailAreForWhatIsFarAndHasColors) {
+  Fixture f;
+  for (const bool colors : {true, false}) {
+    const auto volume = colors ? with_colors_of_nodes(foliage(), Index3(128))
+                               : compressed(foliage(), Index3(128), color::Counts::node);
+    ASSERT_TRUE(volume);
+    CastOptions options = square(64);
+    const Camera camera = Camera::orbit(30, 20, colors ? 0.6 : 12, colors ? 20 : 45);
+    Frame all, some;
+    ASSERT_TRUE(cast(DagGrid(*volume), camera, options, all, f.ctx));
+    options.level_of_detail = true;
+    ASSERT_TRUE(cast(DagGrid(*volume), camera, options, some, f.ctx));
+    EXPECT_GT(all.rays_hit, 0u);
+    EXPECT_EQ(std::memcmp(all.pixels.data(), some.pixels.data(), all.pixels.size() * sizeof(Pixel)), 0);
   }
-  options.level_of_detail = false;
-  ASSERT_TRUE(cast(grid, far, options, all, f.ctx));
-  EXPECT_LT(some.blocks_touched, all.blocks_touched);
+}
+
+/// Whatever the way of a ray through void, with packets and boxes or without, on a device, on any number of
+/// threads: it sees the same.
+TEST(DagGrid, LevelsOfDetailDoNotDependOnTheWay) {
+  Fixture f;
+  const std::vector<color::Voxels> scenes = {
+      color::sphere_shell(7), foliage(),
+      color::voxels_where(7, [](uint32_t x, uint32_t y, uint32_t z) { return x % 40 == y % 24 && z > 9; })};
+  for (const color::Voxels& voxels : scenes) {
+    const auto volume = with_colors_of_nodes(voxels, Index3(128));
+    ASSERT_TRUE(volume);
+    const DagGrid grid(*volume);
+    const auto uploaded = DeviceGrid::upload(grid, *Backend::open(BackendKind::threads), f.ctx);
+    ASSERT_TRUE(uploaded);
+    for (const double distance : {0.1, 1.8, 5.0}) {
+      const Camera camera = Camera::orbit(33, 20, distance, 45);
+      CastOptions options = square(45);
+      options.level_of_detail = true;
+      Frame expected, frame;
+      ASSERT_TRUE(cast(grid, camera, options, expected, f.ctx));
+      EXPECT_GT(expected.rays_hit, 0u);
+      const auto same = [&] {
+        for (size_t i = 0; i < frame.pixels.size(); ++i) {
+          ASSERT_EQ(std::memcmp(&frame.pixels[i], &expected.pixels[i], sizeof(Pixel)), 0) << i;
+          ASSERT_EQ(std::memcmp(&frame.details[i].voxel, &expected.details[i].voxel, 12), 0) << i;
+        }
+      };
+      for (const Traversal traversal : {Traversal::path, Traversal::restart}) {
+        for (const bool plain : {false, true}) {
+          options.traversal = traversal;
+          options.native = options.skip = !plain;
+          f.ctx.threads = plain ? 1 : 3;
+          ASSERT_TRUE(cast(grid, camera, options, frame, f.ctx));
+          same();
+        }
+        ASSERT_TRUE((*uploaded)->cast(camera, options, frame, f.ctx));
+        same();
+      }
+    }
+  }
+}
+
+/// The mean square error of a picture before white, against one with n x n rays for each of its pixels.
+double error(const Frame& frame, const Frame& fine, int n) {
+  double sum = 0;
+  for (int y = 0; y < frame.height; ++y)
+    for (int x = 0; x < frame.width; ++x)
+      for (int k = 0; k < 3; ++k) {
+        const auto seen = [k](const Frame& of, int at_x, int at_y) {
+          const Pixel& pixel = of.pixels[static_cast<size_t>(at_y * of.width + at_x)];
+          return static_cast<double>(pixel.color[k] + (1 - pixel.color[3]));
+        };
+        double mean = 0;
+        for (int i = 0; i < n * n; ++i) mean += seen(fine, x * n + i % n, y * n + i / n) / (n * n);
+        const double off = seen(frame, x, y) - mean;
+        sum += off * off;
+      }
+  return sum / (3.0 * frame.width * frame.height);
+}
+
+/// Levels of detail are nearer to what many rays a pixel see than one ray is that sees all detail, and cost
+/// less.
+TEST(DagGrid, LevelsOfDetailAreNearerToTheTruthAndCheaper) {
+  Fixture f;
+  const color::Voxels leaves = color::voxels_where(7, [](uint32_t x, uint32_t y, uint32_t z) {
+    const uint32_t leaf = (x / 6 * 5 + y / 4 * 3 + z / 5 * 7) % 23;
+    return leaf == 0 && (x + y) % 6 == z % 5;
+  });
+  for (const color::Voxels& voxels : {color::sphere_shell(7), leaves}) {
+    const auto volume = with_colors_of_nodes(voxels, Index3(128));
+    ASSERT_TRUE(volume);
+    for (const double distance : {4.0, 8.0}) {
+      const Camera camera = Camera::orbit(30, 20, distance, 20);
+      CastOptions options = square(40 * 8);
+      Frame fine, all, some;
+      ASSERT_TRUE(cast(DagGrid(*volume), camera, options, fine, f.ctx));
+      options = square(40);
+      ASSERT_TRUE(cast(DagGrid(*volume), camera, options, all, f.ctx));
+      options.level_of_detail = true;
+      ASSERT_TRUE(cast(DagGrid(*volume), camera, options, some, f.ctx));
+      EXPECT_LT(error(some, fine, 8), error(all, fine, 8));
+      EXPECT_LT(some.cells_visited, all.cells_visited);
+    }
+  }
 }
 
 TEST(DagGrid, EmptySpaceIsCrossedInFewSteps) {
