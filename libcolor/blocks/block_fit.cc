@@ -1,7 +1,6 @@
 #include "libcolor/blocks/block_fit.h"
 
 #include <algorithm>
-#include <bit>
 #include <cmath>
 
 #include "libcolor/blocks/directions.h"
@@ -33,17 +32,17 @@ Line line_of(const MacroColors::Sums& s, double count) {
   line.axis = {0, 0, 0};
   line.residual = 0;
   if (trace <= 0) return line;
-  // To a trace of 1/2 to 1 by a power of two. In so few squarings it stays above 2^-82.
-  constexpr uint64_t exponent = uint64_t{0x7ff} << 52;
-  const double scale =
-      std::bit_cast<double>((uint64_t{2045} << 52) - (std::bit_cast<uint64_t>(trace) & exponent));
   std::array<double, 6> m;
-  for (size_t i = 0; i < 6; ++i) m[i] = c[i] * scale;
+  for (size_t i = 0; i < 6; ++i) m[i] = c[i] / trace;
   constexpr int squarings = 5;  // the ratio of two eigenvalues to the power of 32
-  for (int k = 0; k < squarings; ++k)
-    m = {m[0] * m[0] + m[3] * m[3] + m[4] * m[4], m[3] * m[3] + m[1] * m[1] + m[5] * m[5],
-         m[4] * m[4] + m[5] * m[5] + m[2] * m[2], m[0] * m[3] + m[3] * m[1] + m[4] * m[5],
-         m[0] * m[4] + m[3] * m[5] + m[4] * m[2], m[3] * m[4] + m[1] * m[5] + m[5] * m[2]};
+  for (int k = 0; k < squarings; ++k) {
+    const std::array<double, 6> q = {
+        m[0] * m[0] + m[3] * m[3] + m[4] * m[4], m[3] * m[3] + m[1] * m[1] + m[5] * m[5],
+        m[4] * m[4] + m[5] * m[5] + m[2] * m[2], m[0] * m[3] + m[3] * m[1] + m[4] * m[5],
+        m[0] * m[4] + m[3] * m[5] + m[4] * m[2], m[3] * m[4] + m[1] * m[5] + m[5] * m[2]};
+    const double scale = 1 / (q[0] + q[1] + q[2]);
+    for (size_t i = 0; i < 6; ++i) m[i] = q[i] * scale;
+  }
   // Any column that is not zero points along the axis; the longest is the most exact.
   Vec3 axis = {m[0], m[3], m[4]};
   if (m[1] > m[0] && m[1] >= m[2]) axis = {m[3], m[1], m[5]};
@@ -100,12 +99,6 @@ Rgb MacroColors::color(uint32_t i) const {
           static_cast<uint8_t>(channels_[2][i])};
 }
 
-MacroColors::Sums MacroColors::sums(uint32_t first, uint32_t last) const {
-  Sums s;
-  for (size_t k = 0; k < s.size(); ++k) s[k] = prefix_[last][k] - prefix_[first][k];
-  return s;
-}
-
 namespace {
 
 ColorRun run_of(const MacroColors& colors, uint32_t first, uint32_t last) {
@@ -113,6 +106,14 @@ ColorRun run_of(const MacroColors& colors, uint32_t first, uint32_t last) {
 }
 
 }  // namespace
+
+Fitter::Fitter(const MacroColors& colors, Endpoints endpoints, uint32_t allowed, int effort)
+    : colors_(colors), endpoints_(endpoints), allowed_(allowed), tries_(effort + 1) {
+  // What is decoded is off a line by less than rounding may move it.
+  constexpr double rounding = 0.87;
+  const double reach = std::sqrt(static_cast<double>(allowed_)) + rounding;
+  most_residual_ = reach * reach;
+}
 
 Rgb Fitter::quantised(const std::array<float, 3>& color) const {
   const auto to = [](float v, float most) {
@@ -182,10 +183,8 @@ Fit Fitter::fit_line(uint32_t first, uint32_t last, int bits) const {
       tries_};
   Fit best;
   if (colors_.space() != ErrorSpace::rgb) return fit_lab_line(first, last, bits, tries);
-  // No line does better than this one; what is decoded is off the line by less than rounding may move it.
-  constexpr double rounding = 0.87;
-  const double reach = std::sqrt(static_cast<double>(allowed_)) + rounding;
-  if (line.residual > reach * reach) return best;
+  // No line does better than this one.
+  if (line.residual > most_residual_) return best;
   const LineFit fit = kernels_.line(run, tries, most, allowed_);
   return {fit.feasible, fit.a, fit.b, fit.squared_error};
 }

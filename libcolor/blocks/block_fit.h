@@ -26,7 +26,11 @@ class MacroColors {
 
   /// Sums over colours: r, g, b, rr, gg, bb, rg, rb, gb.
   using Sums = std::array<uint32_t, 9>;
-  Sums sums(uint32_t first, uint32_t last) const;
+  Sums sums(uint32_t first, uint32_t last) const {
+    Sums s;
+    for (size_t k = 0; k < s.size(); ++k) s[k] = prefix_[last][k] - prefix_[first][k];
+    return s;
+  }
   /// Channel c of all colours, as whole numbers; whole vectors may be read from any of them.
   const float* channel(size_t c) const { return channels_[c].data(); }
   /// The same in CIELAB, times lab_scale, or as directions, of length direction_scale, if the space is that.
@@ -52,8 +56,7 @@ class Fitter {
  public:
   /// `allowed`: the greatest squared distance that any decoded colour may have, in the unit of a Fit.
   /// `effort`, 1 to 9: how many pairs of ends are tried.
-  Fitter(const MacroColors& colors, Endpoints endpoints, uint32_t allowed, int effort)
-      : colors_(colors), endpoints_(endpoints), allowed_(allowed), tries_(effort + 1) {}
+  Fitter(const MacroColors& colors, Endpoints endpoints, uint32_t allowed, int effort);
   /// The colours first .. last, half open, with `bits` bits a weight, 0 to 4.
   Fit fit(uint32_t first, uint32_t last, int bits) const;
   /// The greatest squared distance of a fit; in CIELAB times lab_scale^2. `out`: the weights, in order, with
@@ -74,6 +77,7 @@ class Fitter {
   Endpoints endpoints_;
   uint32_t allowed_;
   int tries_;
+  double most_residual_;  ///< mean squared distance from a line beyond which none is feasible
 };
 
 }  // namespace voxkit::color
