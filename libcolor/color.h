@@ -53,9 +53,9 @@ Result<Report> encode(SurfaceSource& source, const Options& options, const Store
                       const ByteSink& sink, Context& ctx);
 
 /// A compressed surface, opened for random access. Safe on any bytes: every operation returns an error or a
-/// well-formed answer. The DAG is verified when it is first used, colours part by part. Of images, the first
-/// colour of a part takes as long as all of them: they are decoded and kept (decoded_parts.h). Const
-/// functions are thread-safe.
+/// well-formed answer. The DAG is verified when it is first used, colours part by part. Of images and
+/// predicted colours, the first colour of a part takes as long as all of them: they are decoded and kept
+/// (decoded_parts.h). Const functions are thread-safe.
 class Volume {
  public:
   /// `memory`: what decoded images, octrees and the DAGs that are made of them count against; it must outlive

@@ -18,6 +18,7 @@
 #include "libcolor/layout.h"
 #include "libcolor/octree/octree_encode.h"
 #include "libcolor/part_codecs.h"
+#include "libcolor/predicted/predicted.h"
 #include "libcolor/simplify/hausdorff.h"
 #include "libcolor/simplify/simplified_surface.h"
 #include "libcolor/textures/astc.h"
@@ -31,7 +32,12 @@ namespace {
 class ColorWriter {
  public:
   ColorWriter(const Options& options, const StoredPart& stored, ContainerWriter& container, Context& ctx)
-      : options_(options), stored_(stored), container_(container), ctx_(ctx), reservation_(*ctx.memory) {}
+      : options_(options),
+        stored_(stored),
+        container_(container),
+        ctx_(ctx),
+        reservation_(*ctx.memory),
+        with_places_(options.codec == ColorCodec::predicted) {}
 
   Status begin() {
     batch_ = static_cast<size_t>(2 * ctx_.threads);
@@ -40,12 +46,23 @@ class ColorWriter {
     if (makes_images(options_.codec))
       VOX_CHECK(reservation_.add(static_cast<uint64_t>(ctx_.threads) * image_part_work_bytes(options_.codec),
                                  "encoding images of colors"));
+    if (with_places_) {
+      VOX_CHECK(reservation_.add(batch_ * part_colors * sizeof(uint64_t) +
+                                     static_cast<uint64_t>(ctx_.threads) * predicted_encode_bytes,
+                                 "predicting colors"));
+      places_.reserve(batch_ << part_log2);
+    }
     colors_.reserve(batch_ << part_log2);
     return {};
   }
   Status add(Rgb color) {
     colors_.push_back(color);
     return colors_.size() == batch_ << part_log2 ? flush() : Status();
+  }
+  /// Of a voxel, in Morton order.
+  Status add(const SurfaceVoxel& voxel) {
+    if (with_places_) places_.push_back(voxel.place);
+    return add(voxel.color);
   }
   /// Writes the palette that colours are coded with, before the first of them.
   Status use(const Palette& palette) {
@@ -67,8 +84,11 @@ class ColorWriter {
     std::vector<EncodedPart> encoded(count);
     VOX_CHECK(parallel_for(ctx_, static_cast<int64_t>(count), [&](int64_t i) -> Status {
       const auto part = static_cast<uint64_t>(i);
-      const auto own = std::span(colors_).subspan(part << part_log2, colors_of_part(colors_.size(), part));
-      VOX_TRY(encoded[part], stored_or_encoded(next_part_ + part, own));
+      const size_t first = part << part_log2, own = colors_of_part(colors_.size(), part);
+      const PartContext context{
+          palette_, with_places_ ? std::span(places_).subspan(first, own) : std::span<const uint64_t>()};
+      VOX_TRY(encoded[part],
+              stored_or_encoded(next_part_ + part, std::span(colors_).subspan(first, own), context));
       return {};
     }));
     for (const EncodedPart& part : encoded) {
@@ -79,22 +99,22 @@ class ColorWriter {
       most_squared = std::max(most_squared, part.most_squared);
     }
     colors_.clear();
+    places_.clear();
     seconds += seconds_since(start);
     return {};
   }
-  Result<EncodedPart> stored_or_encoded(uint64_t number, std::span<const Rgb> colors) const {
-    if (!stored_) return encode(colors);
+  Result<EncodedPart> stored_or_encoded(uint64_t number, std::span<const Rgb> colors,
+                                        const PartContext& context) const {
+    const auto encode = [&] { return part_codec(options_.codec).encode(colors, options_, context); };
+    if (!stored_) return encode();
     const auto count = static_cast<uint32_t>(colors.size());
     VOX_TRY(auto known, stored_(number, count));
-    if (!known) return encode(colors);
+    if (!known) return encode();
     EncodedPart part;
     part.bytes = std::move(*known);
     if (makes_textures(options_.codec))
       part.blocks = TextureLayout(options_.image_curve, block_size_of(options_), count).blocks();
     return part;
-  }
-  Result<EncodedPart> encode(std::span<const Rgb> colors) const {
-    return part_codec(options_.codec).encode(colors, options_, palette_);
   }
 
   const Options& options_;
@@ -102,8 +122,10 @@ class ColorWriter {
   ContainerWriter& container_;
   Context& ctx_;
   Reservation reservation_;
+  const bool with_places_;
   const Palette* palette_ = nullptr;
   std::vector<Rgb> colors_;
+  std::vector<uint64_t> places_;  ///< of the colours, where they tell of them
   size_t batch_ = 0;
   uint64_t next_part_ = 0;
 };
@@ -264,7 +286,7 @@ Result<Report> encode(SurfaceSource& source, const Options& options, const Store
       VOX_CHECK(make_room(held, run.voxels.size(), "room for all colors", reservation));
       for (const SurfaceVoxel& voxel : run.voxels) held.push_back(voxel.color);
     } else {
-      for (const SurfaceVoxel& voxel : run.voxels) VOX_CHECK(colors.add(voxel.color));
+      for (const SurfaceVoxel& voxel : run.voxels) VOX_CHECK(colors.add(voxel));
     }
     if (!reorder) return values.add(run.attributes);
     VOX_CHECK(make_room(held_values, run.attributes.size(), "room for all attributes", reservation));
@@ -316,12 +338,12 @@ Result<Report> encode(SurfaceSource& source, const Options& options, const Store
   p.color_bytes = colors.bytes;
   p.blocks = colors.blocks;
   if (palette) p.palette_colors = static_cast<uint32_t>(palette->colors().size());
-  if (palette || has_threshold(options.codec))
+  if (palette || makes_blocks(options.codec))
     p.macro_blocks = (dag.color_count + macro_block_colors - 1) / macro_block_colors;
   p.image_curve = options.image_curve;
   p.block_size = block_size_of(options);
   if (has_threshold(options.codec)) {
-    p.endpoints = endpoints_for(options.threshold, options.space);
+    if (makes_blocks(options.codec)) p.endpoints = endpoints_for(options.threshold, options.space);
     p.threshold = options.threshold;
     p.space = options.space;
     p.weight_bits = options.codec == ColorCodec::fws ? options.weight_bits : 0;

@@ -96,6 +96,8 @@ Result<Params> unpack_params(std::span<const std::byte> bytes, const VolumeInfo&
       return bad(
           88, fmt::format("blocks of {} x {}: not a size of ASTC", p.block_size.width, p.block_size.height));
   }
+  if (p.codec == ColorCodec::predicted && (p.colors != Colors::leaf || p.curve != Curve::morton))
+    return bad(0, "predicted colors of nodes, or along a Hilbert curve");
   p.space = field(90) == 1 ? ErrorSpace::lab : ErrorSpace::rgb;
   p.geometry = static_cast<Geometry>(field(91));
   if (p.geometry > Geometry::octree) return bad(91, fmt::format("unknown geometry {}", field(91)));

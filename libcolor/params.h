@@ -90,15 +90,21 @@ enum class ColorCodec : uint8_t {
   astc = 5,     ///< the same, blocks of 16 bytes for 16 to 144 colours; not in every build
   bc7 = 6,      ///< the same, blocks of 16 bytes for 16 colours: 8 bits each
   palette = 7,  ///< indices into palettes of blocks, of a palette of the scene (Dado et al. 2016)
-  // The same image as a file: a part is decoded as a whole. A module each.
+  // Decoded as a whole, from here on. The same image as a file, a module each:
   jpeg = 8,
   jp2 = 9,
   png = 10,
+  predicted = 11,  ///< from the voxels around, within a threshold (section 4.12): for storage
 };
+
+/// Whether a codec makes blocks of colours on a line.
+constexpr bool makes_blocks(ColorCodec codec) {
+  return codec == ColorCodec::fws || codec == ColorCodec::vws;
+}
 
 /// Whether a codec keeps within a threshold.
 constexpr bool has_threshold(ColorCodec codec) {
-  return codec == ColorCodec::fws || codec == ColorCodec::vws;
+  return makes_blocks(codec) || codec == ColorCodec::predicted;
 }
 
 /// Whether a codec lays colours into images, in blocks of textures.
@@ -119,7 +125,7 @@ inline constexpr int most_simplify = 8;
 /// What an encoder is asked for.
 struct Options {
   ColorCodec codec = ColorCodec::vws;
-  double threshold = 9.56;             ///< of fws and vws: greatest distance of a decoded colour
+  double threshold = 9.56;             ///< of fws, vws, predicted: greatest distance of a decoded colour
   ErrorSpace space = ErrorSpace::rgb;  ///< where that is measured
   int weight_bits = 3;                 ///< of fws: 1 to 4
   int effort = 3;          ///< of fws and vws: 1: the paper's greedy merging; up to 9: smaller, slower; of

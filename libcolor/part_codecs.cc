@@ -6,6 +6,7 @@
 #include "libcolor/blocks/block_encode.h"
 #include "libcolor/palette/palette_check.h"
 #include "libcolor/palette/palette_encode.h"
+#include "libcolor/predicted/predicted.h"
 #include "libcolor/textures/image_codec.h"
 #include "libcolor/textures/texture.h"
 
@@ -18,7 +19,7 @@ Status always(const Options&) {
   return {};
 }
 
-Result<EncodedPart> encode_raw(ColorsOfPart colors, const Options&, const Palette*) {
+Result<EncodedPart> encode_raw(ColorsOfPart colors, const Options&, const PartContext&) {
   static_assert(sizeof(Rgb) == 3);
   const auto raw = std::as_bytes(colors);
   EncodedPart part;
@@ -29,7 +30,7 @@ uint64_t raw_bytes(const Params&, uint32_t colors) {
   return uint64_t{colors} * sizeof(Rgb);
 }
 
-Result<EncodedPart> encode_blocks(ColorsOfPart colors, const Options& o, const Palette*) {
+Result<EncodedPart> encode_blocks(ColorsOfPart colors, const Options& o, const PartContext&) {
   const int weight_bits = o.codec == ColorCodec::fws ? o.weight_bits : 0;
   return encode_part(colors, {o.threshold, weight_bits, o.effort, o.space});
 }
@@ -37,12 +38,12 @@ Result<EncodedPart> encode_blocks(ColorsOfPart colors, const Options& o, const P
 Status supports_texture(const Options& o) {
   return texture_support(o.codec);
 }
-Result<EncodedPart> encode_as_texture(ColorsOfPart colors, const Options& o, const Palette*) {
+Result<EncodedPart> encode_as_texture(ColorsOfPart colors, const Options& o, const PartContext&) {
   return encode_texture(colors, o);
 }
 
-Result<EncodedPart> encode_palette(ColorsOfPart colors, const Options& o, const Palette* palette) {
-  return encode_palette_part(colors, *palette, o.effort);
+Result<EncodedPart> encode_palette(ColorsOfPart colors, const Options& o, const PartContext& context) {
+  return encode_palette_part(colors, *context.palette, o.effort);
 }
 std::string check_palette(std::span<const std::byte> part, const Params& p, uint32_t colors) {
   const PaletteView view(part.data(), part.size(), colors, palette_bits(p.palette_colors));
@@ -52,8 +53,21 @@ std::string check_palette(std::span<const std::byte> part, const Params& p, uint
 Status supports_image(const Options& o) {
   return image_encoder_support(image_format(o.codec), image_coding_of(o, part_colors));
 }
-Result<EncodedPart> encode_image_part(ColorsOfPart colors, const Options& o, const Palette*) {
+Result<EncodedPart> encode_image_part(ColorsOfPart colors, const Options& o, const PartContext&) {
   return encode_as_image(colors, o);
+}
+
+Status supports_predicted(const Options& o) {
+  if (o.colors != Colors::leaf || o.curve != Curve::morton)
+    return bad_usage(
+        "colors predicted from the voxels around: expected those of voxels alone, in Morton order: leave out "
+        "--colors and --curve");
+  if (o.space != ErrorSpace::rgb)
+    return bad_usage("predicted colors with a threshold in CIELAB: expected one in srgb");
+  return {};
+}
+Result<EncodedPart> encode_as_predicted(ColorsOfPart colors, const Options& o, const PartContext& context) {
+  return encode_predicted(colors, context.places, o.threshold);
 }
 
 /// By number, from 1 on.
@@ -68,6 +82,7 @@ constexpr PartCodec codecs[] = {
     {ColorCodec::jpeg, "jpeg", supports_image, encode_image_part, nullptr, nullptr},
     {ColorCodec::jp2, "jp2", supports_image, encode_image_part, nullptr, nullptr},
     {ColorCodec::png, "png", supports_image, encode_image_part, nullptr, nullptr},
+    {ColorCodec::predicted, "predicted", supports_predicted, encode_as_predicted, nullptr, nullptr},
 };
 
 constexpr bool in_order() {

@@ -12,13 +12,20 @@
 
 namespace voxkit::color {
 
+/// What there is beside the colours of a part.
+struct PartContext {
+  const Palette* palette = nullptr;  ///< of the scene, of the palette codec only
+  std::span<const uint64_t> places;  ///< of the voxels that have the colours, of `predicted` only
+};
+
 struct PartCodec {
   ColorCodec codec;
   std::string_view name;
   /// Whether this build can encode with these options; an error says what is missing.
   Status (*support)(const Options& options);
-  /// Encodes 1 to 2^20 colours. `palette`: of the scene, of the palette codec only.
-  Result<EncodedPart> (*encode)(std::span<const Rgb> colors, const Options& options, const Palette* palette);
+  /// Encodes 1 to 2^20 colours.
+  Result<EncodedPart> (*encode)(std::span<const Rgb> colors, const Options& options,
+                                const PartContext& context);
   /// Bytes of a part of so many colours; null where parts say so themselves.
   uint64_t (*part_bytes)(const Params& params, uint32_t colors);
   /// What in a part of so many colours is not as FORMAT.md says, in words; empty if nothing is. Null where

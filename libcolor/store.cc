@@ -3,10 +3,14 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <bit>
 
+#include "libcolor/dag/color_walk.h"
 #include "libcolor/octree/octree_dag.h"
 
 #include "libcolor/part_codecs.h"
+#include "libcolor/predicted/predicted.h"
+#include "libcolor/surface/morton.h"
 #include "libcolor/textures/image_codec.h"
 
 namespace voxkit::color {
@@ -230,19 +234,58 @@ void Store::report(const Error& error) const {
   if (status_) status_ = tl::unexpected<Error>(error);
 }
 
-void Store::decode_images(const Container& container, const Params& params) {
-  if (!makes_images(params.codec)) return;
+Result<std::vector<PartCell>> Store::cells_of_part(uint64_t number, const Container& container,
+                                                   const Params& params) const {
+  const uint64_t first = number << part_log2, last = first + colors_of_part(params.color_count, number);
+  std::vector<PartCell> cells;
+  cells.reserve(last - first);
+  uint64_t next = first;
+  const auto add = [&](uint64_t word, Index3 corner, uint64_t color) {
+    // Other parts may have the first and the last voxels of a word.
+    for (; color < first && word != 0; ++color) word &= word - 1;
+    const uint64_t left = last - next;
+    while (static_cast<uint64_t>(std::popcount(word)) > left) word ^= std::bit_floor(word);
+    if (color != next || word == 0) return false;
+    const uint64_t code = morton_code(static_cast<uint32_t>(corner.x), static_cast<uint32_t>(corner.y),
+                                      static_cast<uint32_t>(corner.z));
+    cells.push_back({code >> 3 * leaf_height, word, static_cast<uint32_t>(next - first)});
+    next += static_cast<uint64_t>(std::popcount(word));
+    return true;
+  };
+  VOX_TRY(OctreeReader* const octree, this->octree(container, params));
+  if (octree != nullptr) {
+    octree->for_each_word_of(first, last - 1, add);
+    VOX_CHECK(octree->status());
+  } else {
+    VOX_TRY(const DagView* const view, dag(container, params));
+    ColorWalk(*view, first, last).run(params.color_count, add);
+  }
+  if (next != last)
+    return bad_input(container.name(),
+                     fmt::format("chunk COLR 0.{}: counts of colors that do not add up", number));
+  return cells;
+}
+
+void Store::decode_whole_parts(const Container& container, const Params& params) {
+  const bool predicted = params.codec == ColorCodec::predicted;
+  if (!predicted && !makes_images(params.codec)) return;
   decode_parts(
-      [&](uint64_t number) -> Result<std::vector<Rgb>> {
+      [this, &container, &params, predicted](uint64_t number) -> Result<std::vector<Rgb>> {
         VOX_TRY(const auto bytes, container.chunk(parts_[number]));
-        auto colors = decode_as_image(bytes, params.codec, params.image_curve,
-                                      colors_of_part(params.color_count, number));
+        const uint32_t count = colors_of_part(params.color_count, number);
+        std::vector<PartCell> cells;
+        if (predicted) {
+          VOX_TRY(cells, cells_of_part(number, container, params));
+        }
+        auto colors = predicted ? decode_predicted(bytes, cells, count)
+                                : decode_as_image(bytes, params.codec, params.image_curve, count);
         if (!colors)
           return fail(colors.error().code, container.name(),
                       fmt::format("chunk COLR 0.{}: {}", number, colors.error().what));
         return colors;
       },
-      image_part_work_bytes(params.codec));
+      predicted ? predicted_decode_bytes(std::min<uint64_t>(params.color_count, part_colors))
+                : image_part_work_bytes(params.codec));
 }
 
 void Store::decode_parts(DecodedParts::Decode decode, uint64_t work_bytes) {
@@ -279,10 +322,10 @@ bool ColorReader::open(uint64_t part) {
     palette_.open(PaletteView(bytes_, store_.part_bytes(part), colors_of_part(params_.color_count, part),
                               palette_bits(params_.palette_colors)),
                   store_.palette());
-  if (has_threshold(params_.codec))
+  if (makes_blocks(params_.codec))
     view_ = PartView(bytes_, store_.part_bytes(part), colors_of_part(params_.color_count, part),
                      params_.endpoints);
-  if (!plain_ && has_threshold(params_.codec) && !view_.valid()) damaged("fewer bytes than its blocks take");
+  if (!plain_ && makes_blocks(params_.codec) && !view_.valid()) damaged("fewer bytes than its blocks take");
   return true;
 }
 

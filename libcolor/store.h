@@ -11,6 +11,7 @@
 #include "libcolor/layout.h"
 #include "libcolor/octree/octree_reader.h"
 #include "libcolor/palette/palette_layout.h"
+#include "libcolor/predicted/part_voxels.h"
 #include "libcolor/textures/decoded_parts.h"
 #include "libcolor/textures/texture.h"
 
@@ -24,8 +25,8 @@ class Store {
   int threads() const { return ctx_.threads; }
   /// Finds the chunks that follow from the parameters, and no others; verifies the palette.
   Status find_chunks(const Container& container, const Params& params);
-  /// Of images: what parts are decoded by. The arguments must outlive the store.
-  void decode_images(const Container& container, const Params& params);
+  /// Of images and predicted colours: what parts are decoded by. The arguments must outlive the store.
+  void decode_whole_parts(const Container& container, const Params& params);
   /// Colours of parts come from `decode`, whatever the codec.
   void decode_parts(DecodedParts::Decode decode, uint64_t work_bytes);
   /// The DAG, all of which is verified now; or made of the octree.
@@ -57,6 +58,9 @@ class Store {
   Status find_palette(const Container& container, const Params& params);
   Status open_octree(const Container& container, const Params& params) const;
   Result<DagView> view_of_chunks(const Container& container, const Params& params) const;
+  /// Where the voxels of a part of predicted colours are.
+  Result<std::vector<PartCell>> cells_of_part(uint64_t number, const Container& container,
+                                              const Params& params) const;
   [[gnu::cold]] const std::byte* verify(uint64_t number, const Container& container) const;
 
   MemoryBudget& memory_;

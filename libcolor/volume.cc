@@ -62,7 +62,7 @@ Result<std::shared_ptr<const Volume>> Volume::open(std::shared_ptr<const Contain
   if (memory == nullptr) memory = &volume->own_memory_.emplace();
   volume->store_ = std::make_unique<Store>(*memory, threads);
   VOX_CHECK(volume->store_->find_chunks(*container, volume->params_));
-  volume->store_->decode_images(*container, volume->params_);
+  volume->store_->decode_whole_parts(*container, volume->params_);
   volume->container_ = std::move(container);
   return volume;
 }

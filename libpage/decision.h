@@ -37,18 +37,24 @@ bool read_decision_numbers(BitReader& in, std::span<uint8_t> numbers);
 struct Decision {
   uint16_t part, start;
 };
+/// The first of two has this part of 2048, which is neither 0 nor all.
+inline Decision decision_of_part(uint32_t part, bool first) {
+  return first ? Decision{static_cast<uint16_t>(part), 0}
+               : Decision{static_cast<uint16_t>(table_total - part), static_cast<uint16_t>(part)};
+}
 inline Decision decision(uint8_t number, bool first) {
-  const uint16_t part = decision_parts[number];
-  return first ? Decision{part, 0} : Decision{static_cast<uint16_t>(table_total - part), part};
+  return decision_of_part(decision_parts[number], first);
 }
 /// Reads one, and renews the state.
-inline bool decide(RansDecoder& coder, uint8_t number) {
-  const uint32_t part = decision_parts[number];
+inline bool decide_of_part(RansDecoder& coder, uint32_t part) {
   const auto slot = static_cast<uint32_t>(coder.state & (table_total - 1));
   const bool first = slot < part;
   coder.state = (coder.state >> table_bits) * (first ? part : table_total - part) + slot - (first ? 0 : part);
   coder.renew();
   return first;
+}
+inline bool decide(RansDecoder& coder, uint8_t number) {
+  return decide_of_part(coder, decision_parts[number]);
 }
 
 }  // namespace voxkit::page

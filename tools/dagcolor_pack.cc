@@ -23,7 +23,7 @@ struct Options {
   std::map<size_t, glm::dvec3> places;  ///< of inputs that are moved
   std::string output, tiles;
   SurfaceOptions surface;
-  std::string kind = "thin", codec = "vws", image_curve = "morton", curve = "morton", colors = "leaf",
+  std::string kind = "thin", codec, image_curve = "morton", curve = "morton", colors = "leaf",
               counts = "node", space = "srgb", emissive = "add", geometry = "auto", purpose = "access";
   color::Options encoder;
   std::optional<uint32_t> palette;
@@ -71,12 +71,17 @@ void declare(CommandLine& line, Options& o) {
       attribute_thresholds(o.encoder.attribute_thresholds));
   line.option("--frame", "N", "Of an animated .vox model: which frame, from 0 (0)",
               integer(o.surface.frame, 0, uint32_t{1} << 31));
-  line.option("--codec", "CODEC",
-              "raw: 24 bits a colour; fws, vws: blocks with weights of fixed and of variable size; bc1, bc7, "
-              "astc: images, as textures, of 4, 8 and 0.89 to 8 bits a colour; palette: indices into a "
-              "palette of the scene; jpeg, jp2, png: images as files, smaller, but decoded as a whole (vws)",
-              one_of(o.codec, {"raw", "fws", "vws", "bc1", "bc7", "astc", "palette", "jpeg", "jp2", "png"}));
-  line.option("-e,--threshold", "E", "Of blocks: no colour is further from the original (9.56)",
+  line.option(
+      "--codec", "CODEC",
+      "raw: 24 bits a colour; fws, vws: blocks with weights of fixed and of variable size; bc1, bc7, "
+      "astc: images, as textures, of 4, 8 and 0.89 to 8 bits a colour; palette: indices into a "
+      "palette of the scene; jpeg, jp2, png: images as files, smaller, but decoded as a whole; predicted: "
+      "from the voxels around, smallest, decoded as a whole (vws, or for storage predicted)",
+      one_of(o.codec,
+             {"raw", "fws", "vws", "bc1", "bc7", "astc", "palette", "jpeg", "jp2", "png", "predicted"}));
+  line.option("-e,--threshold", "E",
+              "Of blocks and predicted: no colour is further from the original; of predicted 0: lossless "
+              "(9.56)",
               number(o.encoder.threshold, 0, 1e6));
   line.option("--space", "SPACE",
               "Of blocks: the threshold is a distance in srgb, of 0 to 255, or in lab: CIELAB, 1976 (srgb)",
@@ -119,9 +124,8 @@ void declare(CommandLine& line, Options& o) {
       "octree (auto)",
       one_of(o.geometry, {"auto", "dag", "ssvdag", "octree"}));
   line.option("--for", "WHAT",
-              "What the file is made for: access or storage: the smaller geometry, and --zstd 19 unless "
-              "another level "
-              "is said (access)",
+              "What the file is made for: access or storage: the smaller geometry, and, unless another "
+              "codec or level is said, predicted colors and --zstd 19 (access)",
               one_of(o.purpose, {"access", "storage"}));
   line.option("--simplify", "D",
               "Fewer voxels, for scans, where nothing repeats: each that there was has one within D voxels, "
@@ -148,9 +152,16 @@ std::optional<color::Geometry> geometry_of(const Options& o) {
   return {};
 }
 
+/// Not said: for storage the smallest one, unless other options ask for what it has not.
+color::ColorCodec codec_of(const Options& o) {
+  if (!o.codec.empty()) return *color::codec_named(o.codec);
+  const bool fits = o.colors == "leaf" && o.curve == "morton" && o.space == "srgb";
+  return o.purpose == "storage" && fits ? color::ColorCodec::predicted : color::ColorCodec::vws;
+}
+
 color::Options encoder_options(const Options& o) {
   color::Options options = o.encoder;
-  options.codec = *color::codec_named(o.codec);
+  options.codec = codec_of(o);
   if (o.palette && options.codec == color::ColorCodec::palette) options.palette = *o.palette;
   if (o.palette && options.codec == color::ColorCodec::png)
     options.image_palette = static_cast<int>(*o.palette);

@@ -84,7 +84,7 @@ double attribute_error(Attribute attribute, ErrorSpace space, uint32_t a, uint32
 std::vector<std::byte> pack_attribute(const AttributeParams& p) {
   std::vector<std::byte> bytes(chunk_bytes);
   bytes[0] = static_cast<std::byte>(p.codec);
-  if (has_threshold(p.codec)) bytes[1] = static_cast<std::byte>(p.endpoints);
+  if (makes_blocks(p.codec)) bytes[1] = static_cast<std::byte>(p.endpoints);
   bytes[2] = static_cast<std::byte>(p.weight_bits);
   bytes[3] = static_cast<std::byte>(p.space);
   store_le(&bytes[8], p.threshold);
@@ -105,9 +105,9 @@ Result<AttributeParams> unpack_attribute(Attribute attribute, std::span<const st
   p.attribute = attribute;
   p.codec = static_cast<ColorCodec>(field(0));
   const bool id = attribute == Attribute::id;
-  if (p.codec != ColorCodec::raw && (id ? p.codec != ColorCodec::palette : !has_threshold(p.codec)))
+  if (p.codec != ColorCodec::raw && (id ? p.codec != ColorCodec::palette : !makes_blocks(p.codec)))
     return bad(0, fmt::format("codec {}: not one of {}", field(0), kind_of(attribute).name));
-  if (has_threshold(p.codec)) {
+  if (makes_blocks(p.codec)) {
     p.endpoints = static_cast<Endpoints>(field(1));
     const size_t own = kind_of(attribute).bytes;
     if (field(1) < 1 || field(1) > static_cast<int>(Endpoints::two) || value_bytes(p.endpoints) != own)

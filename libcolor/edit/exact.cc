@@ -14,7 +14,8 @@ Options exact_options(std::span<const Params> files) {
   options.codec = ColorCodec::vws;
   options.threshold = 0;
   options.attribute_thresholds.fill(0);
-  if (first.codec == ColorCodec::raw || first.codec == ColorCodec::png || first.codec == ColorCodec::jp2)
+  if (first.codec == ColorCodec::raw || first.codec == ColorCodec::png || first.codec == ColorCodec::jp2 ||
+      first.codec == ColorCodec::predicted)
     options.codec = first.codec;
   // With as many colours as all palettes have, each is one of the new palette. Those of nodes are new.
   uint64_t colors = 0;

@@ -108,6 +108,23 @@ Status OctreeReader::decode_page(int height, uint64_t page) {
   return {};
 }
 
+OctreeReader::NodePath OctreeReader::path_to(uint64_t voxel) const {
+  NodePath path{voxel};
+  for (int h = 1; h <= octree_->height(); ++h) {
+    const uint64_t child = path[static_cast<size_t>(h) - 1];
+    const uint64_t page = octree_->level(h).page_with_child(child);
+    const OctreeLevel& level = octree_->level_at(h, page << page_nodes_log2);
+    // The last one whose children begin there or before.
+    uint64_t node = page << page_nodes_log2, behind = node + nodes_of_page(level.nodes(), page);
+    while (behind - node > 1) {
+      const uint64_t middle = node + (behind - node) / 2;
+      (level.first_child(middle) <= child ? node : behind) = middle;
+    }
+    path[static_cast<size_t>(h)] = node;
+  }
+  return path;
+}
+
 void OctreeReader::load(int height, uint64_t page) {
   const std::lock_guard lock(loading_);
   OctreeLevel& level = octree_->level(height);

@@ -1,6 +1,7 @@
 // An octree in a file: a page is decoded when it is first asked for.
 #pragma once
 
+#include <array>
 #include <functional>
 #include <memory>
 #include <mutex>
@@ -40,7 +41,20 @@ class OctreeReader {
   template <class Visit>
   bool for_each_word(const Box& box, const Visit& visit) const {
     if (octree_->empty()) return true;
-    return node(octree_->height(), 0, Index3(0), box, visit);
+    const auto enter = [&](int h, uint64_t, Index3 at) {
+      return !intersect({at, at + (int64_t{1} << h)}, box).empty();
+    };
+    return node(octree_->height(), 0, Index3(0), enter, visit);
+  }
+  /// The same for the cells that have voxels whose numbers in Morton order are from `first` to `last`.
+  template <class Visit>
+  bool for_each_word_of(uint64_t first, uint64_t last, const Visit& visit) const {
+    if (octree_->empty()) return true;
+    const NodePath from = path_to(first), to = path_to(last);
+    const auto enter = [&](int h, uint64_t number, Index3) {
+      return number >= from[static_cast<size_t>(h)] && number <= to[static_cast<size_t>(h)];
+    };
+    return node(octree_->height(), 0, Index3(0), enter, visit);
   }
 
   /// Whether no voxel is in a box, as far as undamaged pages say.
@@ -61,8 +75,13 @@ class OctreeReader {
   void load(int height, uint64_t page);
   Status decode_page(int height, uint64_t page);
 
-  template <class Visit>
-  bool node(int h, uint64_t number, Index3 corner, const Box& box, const Visit& visit) const {
+  /// By height: a voxel, and the nodes above it.
+  using NodePath = std::array<uint64_t, most_levels + 1>;
+  NodePath path_to(uint64_t voxel) const;
+
+  /// Enters children for which enter(height, number, corner) says so.
+  template <class Enter, class Visit>
+  bool node(int h, uint64_t number, Index3 corner, const Enter& enter, const Visit& visit) const {
     const OctreeLevel& level = octree_->level_at(h, number);
     const uint32_t mask = level.mask(number);
     uint64_t child = level.first_child(number);
@@ -71,7 +90,7 @@ class OctreeReader {
     for (uint32_t octant = 0; octant < 8; ++octant) {
       if ((mask >> octant & 1) == 0) continue;
       const Index3 at = corner + Index3(octant & 1, octant >> 1 & 1, octant >> 2) * side;
-      if (!intersect({at, at + side}, box).empty() && !node(h - 1, child, at, box, visit)) return false;
+      if (enter(h - 1, child, at) && !node(h - 1, child, at, enter, visit)) return false;
       ++child;
     }
     return true;

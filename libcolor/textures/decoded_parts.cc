@@ -42,7 +42,7 @@ Result<std::shared_ptr<const DecodedParts::Part>> DecodedParts::decode(uint64_t 
   auto made = std::make_shared<Part>();
   made->reservation_ = Reservation(memory_);
   for (;;) {
-    Status room = made->reservation_.add(part_bytes + work_bytes_, "decoding an image of colors");
+    Status room = made->reservation_.add(part_bytes + work_bytes_, "decoding a part of colors");
     if (room) break;
     if (!forget_one()) return tl::unexpected<Error>(room.error());
   }

@@ -27,6 +27,7 @@ int main(int count, char** arguments) {
         options.codec = codec;
         options.counts = counts;
         options.colors = colors;
+        if (!validate(options)) continue;
         // Each geometry with some codecs.
         constexpr Geometry geometries[] = {Geometry::dag, Geometry::octree, Geometry::ssvdag};
         options.geometry = geometries[(number / 2) % (counts == Counts::node ? 3 : 2)];

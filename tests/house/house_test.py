@@ -32,9 +32,10 @@ libcolor/faces    -> formats formats/mesh libcolor/surface
 libcolor/blocks   -> formats libcolor/surface libcolor/terms
 libcolor/palette  -> formats libcolor/surface libcolor/terms libcolor/blocks
 libcolor/attributes -> formats libcolor/surface libcolor/terms libcolor/dag libcolor/blocks libcolor/palette
+libcolor/predicted -> formats libpage libcolor/surface libcolor/terms
 libcolor/textures -> formats formats/image libcolor/surface libcolor/terms libcolor/blocks
 libcolor/simplify -> formats libcolor/surface libcolor/terms libcolor/dag
-libcolor          -> formats formats/image libcolor/surface libcolor/terms libcolor/dag libcolor/octree libcolor/blocks libcolor/palette libcolor/attributes libcolor/textures libcolor/simplify
+libcolor          -> formats formats/image libcolor/surface libcolor/terms libcolor/dag libcolor/octree libcolor/blocks libcolor/palette libcolor/attributes libcolor/predicted libcolor/textures libcolor/simplify
 libcolor/edit     -> formats libcolor libcolor/surface libcolor/terms libcolor/dag libcolor/attributes
 libmetrics        -> formats formats/image
 librender         -> formats formats/image libcolor/surface

@@ -57,9 +57,13 @@ std::string encoded(const std::string& key, int threads) {
   const auto source = source_of(fields[0]);
   if (!source) return "no such scene";
   Options options;
-  const std::map<std::string, ColorCodec> codecs{{"raw", ColorCodec::raw}, {"fws", ColorCodec::fws},
-                                                 {"vws", ColorCodec::vws}, {"bc1", ColorCodec::bc1},
-                                                 {"bc7", ColorCodec::bc7}, {"palette", ColorCodec::palette}};
+  const std::map<std::string, ColorCodec> codecs{{"raw", ColorCodec::raw},
+                                                 {"fws", ColorCodec::fws},
+                                                 {"vws", ColorCodec::vws},
+                                                 {"bc1", ColorCodec::bc1},
+                                                 {"bc7", ColorCodec::bc7},
+                                                 {"palette", ColorCodec::palette},
+                                                 {"predicted", ColorCodec::predicted}};
   // "vws-lab": with a threshold in CIELAB; "raw-octree": the way geometry is stored, else as a DAG.
   const auto codec = split(fields[1], '-');
   options.codec = codecs.at(codec[0]);

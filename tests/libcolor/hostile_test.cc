@@ -30,8 +30,10 @@ const std::vector<Bytes>& files() {
           options.counts = counts;
           options.colors = colors;
           if (colors == Colors::all) options.threshold = 3;
-          if ((counts == Counts::pointer) == (codec == ColorCodec::raw || codec == ColorCodec::vws))
+          if ((counts == Counts::pointer) == (codec == ColorCodec::raw || codec == ColorCodec::vws) &&
+              codec != ColorCodec::predicted)
             options.curve = Curve::hilbert;
+          if (!validate(options)) continue;
           if ((counts == Counts::pointer) == (colors == Colors::leaf))
             options.geometry = Geometry::octree;
           else if (codec == ColorCodec::vws)

@@ -31,7 +31,8 @@ inline std::vector<ColorCodec> image_codecs() {
   return codecs;
 }
 inline std::vector<ColorCodec> codecs() {
-  std::vector<ColorCodec> codecs = {ColorCodec::raw, ColorCodec::fws, ColorCodec::vws, ColorCodec::palette};
+  std::vector<ColorCodec> codecs = {ColorCodec::raw, ColorCodec::fws, ColorCodec::vws, ColorCodec::palette,
+                                    ColorCodec::predicted};
   for (const ColorCodec codec : texture_codecs()) codecs.push_back(codec);
   for (const ColorCodec codec : image_codecs()) codecs.push_back(codec);
   return codecs;

@@ -82,8 +82,10 @@ TEST(ColorVolume, EveryVoxelComesBack) {
         options.counts = counts;
         options.colors = colors;
         if (counts == Counts::pointer) options.image_curve = ImageCurve::hilbert;
-        if ((counts == Counts::pointer) == (codec == ColorCodec::raw || codec == ColorCodec::vws))
+        if ((counts == Counts::pointer) == (codec == ColorCodec::raw || codec == ColorCodec::vws) &&
+            codec != ColorCodec::predicted)
           options.curve = Curve::hilbert;
+        if (!validate(options)) continue;
         if (counts == Counts::pointer) {
           options.quality = colors == Colors::leaf ? 0 : 60;
         }

@@ -12,15 +12,18 @@ import argparse
 import json
 import struct
 import sys
+from itertools import islice
 
 from attribute_decode import read_attributes
 from container import Container, Refused, Volume, require
 from octree_decode import Octree
 from png_decode import read_png
+from predicted_decode import decode_predicted
 from symmetric_decode import SymmetricNodes
 
 SURFACE = 3
-CODECS = {1: "raw", 2: "fws", 3: "vws", 4: "bc1", 5: "astc", 6: "bc7", 7: "palette", 8: "jpeg", 9: "jp2", 10: "png"}
+CODECS = {1: "raw", 2: "fws", 3: "vws", 4: "bc1", 5: "astc", 6: "bc7", 7: "palette", 8: "jpeg", 9: "jp2", 10: "png",
+          11: "predicted"}
 GEOMETRIES = {0: "dag", 1: "ssvdag", 2: "octree"}
 VOXELS, ALL = 1, 2
 IN_NODES, BESIDE = 1, 2
@@ -69,6 +72,8 @@ class Surface:
         require(self.endpoints in (1, 2), "chunk DAGP: byte 3: {}", self.endpoints)
         require(curve in (1, 2), "chunk DAGP: byte 6: {}", curve)
         self.hilbert = curve == 2
+        require(CODECS[self.codec] != "predicted" or (self.has_color == VOXELS and not self.hilbert),
+                "chunk DAGP: byte 0: predicted colours in another order")
         require(CODECS[self.codec] not in ("bc1", "png") or self.image_curve in (1, 2), "chunk DAGP: byte 7: {}", self.image_curve)
         require(CODECS[self.codec] not in ("astc", "bc7", "jpeg", "jp2"), "chunk DAGP: byte 0: {} is not supported by this decoder",
                 CODECS[self.codec])
@@ -176,11 +181,17 @@ class Surface:
         require([(c.index, c.part) for c in chunks] == [(0, i) for i in range(parts)], "chunks COLR: not their parts")
         if CODECS[self.codec] == "palette":
             self.read_palette()
+        if CODECS[self.codec] == "predicted":
+            # A damaged DAG may have any number of voxels.
+            self.places = [place for *place, _ in islice(self.walk(), self.count + 1)]
+            require(len(self.places) == self.count, "{} voxels: expected {}", len(self.places), self.count)
         self.colors = []
         for chunk in chunks:
             data = self.container.data[chunk.offset:chunk.offset + chunk.length]
             n = min(PART, self.count - PART * chunk.part)
-            read = {"raw": self.raw, "bc1": self.bc1, "palette": self.palettes, "png": self.png}.get(CODECS[self.codec], self.part)
+            first = PART * chunk.part
+            read = {"raw": self.raw, "bc1": self.bc1, "palette": self.palettes, "png": self.png,
+                    "predicted": lambda data, n: decode_predicted(data, self.places[first:first + n])}.get(CODECS[self.codec], self.part)
             self.colors += read(data, n)
 
     @staticmethod

@@ -129,6 +129,8 @@ class Tools(SurfaceCase):
                         ("--codec", "bc1", "--image-curve", "hilbert", "--colors", "all"),
                         ("--codec", "png"), ("--codec", "png", "--palette", "5", "--image-curve", "hilbert"), ("--codec", "png", "--palette", "200"), ("-e", "2"),
                         ("--codec", "raw", "--zstd", "3"),
+                        ("--codec", "predicted"), ("--codec", "predicted", "-e", "0"),
+                        ("--codec", "predicted", "-e", "30", "--geometry", "octree"),
                         ("-e", "4", "--space", "lab"), ("-e", "25.5", "--effort", "1"),
                         ("--colors", "all"), ("--counts", "pointer"), ("--colors", "all", "--counts", "pointer"),
                         ("--geometry", "dag"), ("--geometry", "dag", "--colors", "all", "--curve", "hilbert"),
@@ -146,7 +148,7 @@ class Tools(SurfaceCase):
                               if noise.random() < share else 4)
             write(self.path("in.raw"), data)
             for options in ((), ("-e", "1"), ("--simplify", "2"), ("--colors", "all"), ("--codec", "bc1"), ("--codec", "palette"), ("--codec", "png"),
-                            ("--codec", "palette", "--palette", "65536"),
+                            ("--codec", "palette", "--palette", "65536"), ("--codec", "predicted"),
                             ("--curve", "hilbert", "--colors", "all")):
                 with self.subTest(dims=dims, options=options):
                     self.compare(self.encode(self.path("in.raw"), "--dims", "%d,%d,%d" % dims, "--type", "rgba8", *options))

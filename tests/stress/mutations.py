@@ -57,6 +57,7 @@ KINDS = {
     "dagc plain": (["dagcolor-pack", "menger:2", "--geometry", "dag"], "a.dagc", PACKED),
     "dagc octree": (["dagcolor-pack", "terrain:40", "--geometry", "octree"], "a.dagc", PACKED),
     "dagc palette": (["dagcolor-pack", "menger:2", "--codec", "palette"], "a.dagc", PACKED),
+    "dagc predicted": (["dagcolor-pack", "menger:2", "--codec", "predicted", "-e", "3"], "a.dagc", PACKED),
     "dagc pointer": (["dagcolor-pack", "menger:2", "--counts", "pointer", "--colors", "all"], "a.dagc", PACKED),
     "dagc attributes": (["dagcolor-pack", "@points.ply", "--resolution", "8", "--attributes", "color,opacity,normal,rm,id"], "a.dagc",
                         PACKED + [["vox-decode", "@", "-o", "out.ply", "-f"], ["vox-convert", "@", "-o", "out.dagc", "-f"]]),

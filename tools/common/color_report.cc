@@ -25,7 +25,8 @@ Json params_json(const color::Params& p) {
   if (color::has_threshold(p.codec)) {
     json.set("threshold", p.threshold);
     json.set("space", p.space == color::ErrorSpace::lab ? "lab" : "srgb");
-    json.set("endpoints", p.endpoints == color::Endpoints::rgb565 ? "565" : "888");
+    if (color::makes_blocks(p.codec))
+      json.set("endpoints", p.endpoints == color::Endpoints::rgb565 ? "565" : "888");
   }
   if (p.codec == color::ColorCodec::fws) json.set("weight_bits", p.weight_bits);
   if (p.codec == color::ColorCodec::palette) json.set("palette", p.palette_colors);
@@ -77,7 +78,10 @@ std::string sizes_text(const color::Params& p) {
   if (color::makes_images(p.codec))
     text += fmt::format("images      {}, along a {} curve\n",
                         (p.color_count + color::part_colors - 1) / color::part_colors, name(p.image_curve));
-  if (color::has_threshold(p.codec))
+  if (p.codec == color::ColorCodec::predicted)
+    text += p.threshold < 1 ? "predicted   lossless\n"
+                            : fmt::format("predicted   threshold {:.6g}\n", p.threshold);
+  if (color::makes_blocks(p.codec))
     text += fmt::format("blocks      {} in {} macro blocks, threshold {:.6g}{}\n", p.blocks, p.macro_blocks,
                         p.threshold, p.space == color::ErrorSpace::lab ? " in CIELAB" : "");
   return text;
