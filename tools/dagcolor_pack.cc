@@ -5,6 +5,7 @@
 #include <glm/vec3.hpp>
 #include <map>
 
+#include "formats/names.h"
 #include "formats/output_file.h"
 #include "libcolor/compare.h"
 #include "libcolor/part_codecs.h"
@@ -26,6 +27,7 @@ struct Options {
   std::string kind = "thin", codec, image_curve = "morton", curve = "morton", colors = "leaf",
               counts = "node", space = "srgb", emissive = "add", geometry = "auto", purpose = "access";
   color::Options encoder;
+  std::optional<double> threshold;
   std::optional<uint32_t> palette;
   std::optional<color::AttributeSet> attributes;
   bool verify = false;
@@ -76,13 +78,14 @@ void declare(CommandLine& line, Options& o) {
       "raw: 24 bits a colour; fws, vws: blocks with weights of fixed and of variable size; bc1, bc7, "
       "astc: images, as textures, of 4, 8 and 0.89 to 8 bits a colour; palette: indices into a "
       "palette of the scene; jpeg, jp2, png: images as files, smaller, but decoded as a whole; predicted: "
-      "from the voxels around, smallest, decoded as a whole (vws, or for storage predicted)",
+      "from the voxels around, smallest, decoded as a whole (vws, or for storage predicted; of a .vox model "
+      "palette, or for storage raw: its colours are exact unless a threshold is said)",
       one_of(o.codec,
              {"raw", "fws", "vws", "bc1", "bc7", "astc", "palette", "jpeg", "jp2", "png", "predicted"}));
   line.option("-e,--threshold", "E",
               "Of blocks and predicted: no colour is further from the original; of predicted 0: lossless "
               "(9.56)",
-              number(o.encoder.threshold, 0, 1e6));
+              number(o.threshold, 0, 1e6));
   line.option("--space", "SPACE",
               "Of blocks: the threshold is a distance in srgb, of 0 to 255, or in lab: CIELAB, 1976 (srgb)",
               one_of(o.space, {"srgb", "lab"}));
@@ -152,16 +155,23 @@ std::optional<color::Geometry> geometry_of(const Options& o) {
   return {};
 }
 
-/// Not said: for storage the smallest one, unless other options ask for what it has not.
+/// Not said: for storage the smallest one, unless other options ask for what it has not. Models have few
+/// colours, and all of them count: unless a threshold is said they are exact.
 color::ColorCodec codec_of(const Options& o) {
+  using color::ColorCodec;
   if (!o.codec.empty()) return *color::codec_named(o.codec);
+  const bool storage = o.purpose == "storage";
+  if (o.names.size() == 1 && has_ending(o.names.front(), ".vox") && !o.threshold && o.colors == "leaf")
+    return storage ? ColorCodec::raw
+                   : ColorCodec::palette;  // equal runs of raw colours take zstd next to nothing
   const bool fits = o.colors == "leaf" && o.curve == "morton" && o.space == "srgb";
-  return o.purpose == "storage" && fits ? color::ColorCodec::predicted : color::ColorCodec::vws;
+  return storage && fits ? ColorCodec::predicted : ColorCodec::vws;
 }
 
 color::Options encoder_options(const Options& o) {
   color::Options options = o.encoder;
   options.codec = codec_of(o);
+  options.threshold = o.threshold.value_or(options.threshold);
   if (o.palette && options.codec == color::ColorCodec::palette) options.palette = *o.palette;
   if (o.palette && options.codec == color::ColorCodec::png)
     options.image_palette = static_cast<int>(*o.palette);

@@ -39,7 +39,7 @@ libcolor          -> formats formats/image libcolor/surface libcolor/terms libco
 libcolor/edit     -> formats libcolor libcolor/surface libcolor/terms libcolor/dag libcolor/attributes
 libmetrics        -> formats formats/image
 librender         -> formats formats/image libcolor/surface
-librender/cast    -> formats librender libsvmm libsvmm/packed libcolor libcolor/dag libcolor/attributes libcolor/surface
+librender/cast    -> formats librender libsvmm libsvmm/packed libcolor libcolor/terms libcolor/dag libcolor/attributes libcolor/surface
 librender/dvr     -> formats librender librender/cast libsvmm libsvmm/packed libvq
 librender/device  -> formats librender librender/cast librender/dvr libsvmm libvq libcolor libcolor/dag
 """
