@@ -47,6 +47,7 @@ Seen look(const Volume& volume, const double (&origin)[3], const double (&direct
       .pixel = 0,
       .edge = 1,
       .cone = 0,
+      .coarsest = 0,
       .skip = false,
       .color_of = render::ColorOf(VoxelFormat::density8, {0, 255}),
   };
