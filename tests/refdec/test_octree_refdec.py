@@ -196,7 +196,7 @@ class SmallFile(unittest.TestCase):
 
     def odd(self):
         """With what a reader ignores: bytes that are zero, chunks of kinds that are not known. A state has zeros on top."""
-        self.dagp[92], self.dagp[127], self.pages[1], self.pages[2] = 1, 255, (64, b"\1\0"), (512, b"\1" + bytes(7))
+        self.dagp[92], self.dagp[93], self.dagp[127], self.pages[1], self.pages[2] = 0xe0, 1, 255, (64, b"\1\0"), (512, b"\1" + bytes(7))
         return self.file({**self.chunks(), (b"NEWS", 7, 7): b"?"})
 
     def test_what_is_ignored(self):
