@@ -1,8 +1,8 @@
 // Casting compressed surfaces, from their files: the DAG first, then the colours of what was hit.
 #include "libcolor/store.h"
 #include "librender/cast/cast_tile.h"
-#include "librender/cast/cast_translucent.h"
 #include "librender/cast/glimpses.h"
+#include "librender/cast/see_through.h"
 #include "librender/cast/surface_colors.h"
 #include "librender/cast/surface_traits.h"
 
@@ -18,12 +18,6 @@ Status cast(const DagGrid& grid, const Camera& camera, const CastOptions& option
   VOX_TRY(const color::DagView* const dag, volume.store().dag(volume.container(), volume.params()));
   CastOptions detailed = options;
   detailed.details = true;  // where to look colours up
-  if (volume.params().attributes.has(color::Attribute::opacity)) {
-    VOX_TRY(const CastParams params, cast_params(grid.info(), camera, options));
-    VOX_CHECK(cast_translucent(volume, *dag, params, detailed, frame, ctx));
-    if (!options.details) frame.details.clear();
-    return {};
-  }
   VOX_TRY(CastParams params, surface_params(volume, camera, options));
   VOX_TRY(const std::unique_ptr<Buffer> glimpses, hold_glimpses(params, ctx));
   params.glimpses = glimpses_in(glimpses);
@@ -39,8 +33,16 @@ Status cast(const DagGrid& grid, const Camera& camera, const CastOptions& option
     VOX_CHECK(glimpses ? cast_with(levels, params, detailed, frame, ctx)
                        : cast_with(all, params, detailed, frame, ctx));
   }
-  VOX_CHECK(look_up_traits(volume, options.traits, true, frame, ctx));
   VOX_CHECK(look_up_colors(volume, params.glimpses, frame, ctx));
+  const bool opacities = volume.params().attributes.has(color::Attribute::opacity);
+  CastParams all_detail = params;
+  all_detail.cone = 0;
+  std::vector<uint8_t> translucent;
+  if (opacities) {
+    VOX_TRY(translucent, see_through(volume, *dag, all_detail, params.glimpses, frame, ctx));
+  }
+  VOX_CHECK(look_up_traits(volume, options.traits, params.glimpses, frame, ctx));
+  if (opacities) VOX_CHECK(shine_through(volume, *dag, all_detail, translucent, frame, ctx));
   if (!options.details) frame.details.clear();
   return {};
 }

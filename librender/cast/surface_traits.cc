@@ -11,6 +11,7 @@
 #include "libcolor/store.h"
 #include "libcolor/surface/morton.h"
 #include "libcolor/surface/octahedral.h"
+#include "librender/cast/beam.h"
 
 namespace voxkit::render {
 namespace {
@@ -19,6 +20,16 @@ using color::Attribute;
 
 float share(uint32_t value, int byte) {
   return static_cast<float>(value >> 8 * byte & 255u) * (1.0f / 255);
+}
+
+/// Of the cell with a voxel, of those that a pixel sees; 0 of none: then it is a voxel.
+int height_at(const Glimpse* glimpse, const int32_t (&voxel)[3]) {
+  for (int n = 0; n < Beam::most_cells && glimpse->ninths > 0; ++n, ++glimpse) {
+    bool same = true;
+    for (int a = 0; a < 3; ++a) same &= (glimpse->voxel[a] ^ voxel[a]) >> glimpse->log2_edge == 0;
+    if (same) return glimpse->log2_edge;
+  }
+  return 0;
 }
 
 }  // namespace
@@ -30,8 +41,8 @@ color::AttributeSet traits_of(const color::Volume& volume, color::AttributeSet w
   return wanted;
 }
 
-Status look_up_traits(const color::Volume& volume, color::AttributeSet wanted, bool heights, Frame& frame,
-                      Context& ctx) {
+Status look_up_traits(const color::Volume& volume, color::AttributeSet wanted, const Glimpse* glimpses,
+                      Frame& frame, Context& ctx) {
   VOX_CHECK(frame.begin_traits(traits_of(volume, wanted), ctx));
   if (frame.has.empty()) return {};
   const auto start = Clock::now();
@@ -58,9 +69,9 @@ Status look_up_traits(const color::Volume& volume, color::AttributeSet wanted, b
       if (voxel[0] < 0) continue;
       const uint64_t place = color::morton_code(
           static_cast<uint32_t>(voxel[0]), static_cast<uint32_t>(voxel[1]), static_cast<uint32_t>(voxel[2]));
-      const int height =
-          heights ? static_cast<int>(frame.pixels[static_cast<size_t>(i)].color[0] * 255 + 0.5f) : 0;
-      const uint64_t index = finder.find(place, height).color;
+      const auto found = finder.find(place, glimpses ? height_at(glimpses + i * Beam::most_cells, voxel) : 0);
+      if (!found.there) continue;
+      const uint64_t index = found.color;
       if (const auto light = read(Attribute::emissive, index))
         for (int k = 0; k < 3; ++k) traits.emissive[k] = share(*light, k);
       if (const auto opacity = read(Attribute::opacity, index)) traits.opacity = share(*opacity, 0);

@@ -138,8 +138,8 @@ class Dag final : public Grid {
                   : cast_with(DagCastView<Search::path>{view_.data()}, params, frame, ctx));
     if (buffer)
       VOX_CHECK(backend().download(written, 0, std::span<Glimpse>(glimpses, glimpse_count(params))));
-    VOX_CHECK(look_up_traits(grid_.volume(), options.traits, true, frame, ctx));
     VOX_CHECK(look_up_colors(grid_.volume(), glimpses, frame, ctx));
+    VOX_CHECK(look_up_traits(grid_.volume(), options.traits, glimpses, frame, ctx));
     if (!options.details) frame.details.clear();
     return {};
   }
