@@ -20,6 +20,7 @@ struct NodeRef {
   bool there = false;
   const uint32_t* words = nullptr;  ///< of a DAG without symmetry; of one with it:
   uint32_t codes = 0, mirror = 0;
+  uint64_t starts = 0;  ///< where pointers begin among the children, a byte for each octant as it is stored
   const uint8_t *children = nullptr,
                 *end = nullptr;          ///< what its octants have; the end of its height's bytes
   const uint8_t* above_words = nullptr;  ///< above leaf words: the height's first byte
@@ -135,19 +136,22 @@ struct DagView {
     ref.codes = first[0] | static_cast<uint32_t>(first[1]) << 8;
     ref.mirror = pointer >> mirror_shift;
     ref.mask = mirrored_octants(octants_of_codes(ref.codes), ref.mirror);
+    ref.starts = pointer_starts(ref.codes);
     ref.end = coded[at] + coded_bytes[at];
     ref.children = count_at(first + 2, ref.end).behind;
-    ref.above_words = h == leaf_height + 1 ? coded[at] : nullptr;
+    if (h == leaf_height + 1) {
+      ref.above_words = coded[at];
+      ref.starts = pointer_starts(ref.codes & ~(3 * ref.words_of_codes()));
+    }
     return ref;
   }
   VOX_HD uint32_t symmetric_pointer(const NodeRef& node, uint32_t octant) const {
     const uint32_t stored = octant ^ node.mirror, code = node.codes >> 2 * stored & 3;
-    const uint32_t in_node = node.words_of_codes(), before = (1u << 2 * stored) - 1;
     if (code == code_other && node.above_words != nullptr)
       return node.mirror << mirror_shift | word_in_node |
-             static_cast<uint32_t>(behind_words(node, in_node & before) - node.above_words);
-    const uint8_t* const at = node.children + pointer_bytes_of(node.codes & ~(3 * in_node) & before);
-    return pointer_at(node, at, code);
+             static_cast<uint32_t>(behind_words(node, node.words_of_codes() & ((1u << 2 * stored) - 1)) -
+                                   node.above_words);
+    return pointer_at(node, node.children + (node.starts >> 8 * stored & 0xff), code);
   }
   /// The pointer of this code that begins at a byte; one that leads nowhere if it is cut off.
   VOX_HD static uint32_t pointer_at(const NodeRef& node, const uint8_t* at, uint32_t code) {

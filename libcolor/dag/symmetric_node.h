@@ -65,6 +65,16 @@ VOX_HD constexpr uint32_t pointer_bytes_of(uint32_t codes) {
   return sum(codes) + sum((codes | codes >> 1) & 0x5555);
 }
 
+/// For each octant a byte: how many bytes of pointers of these codes come before its own.
+VOX_HD constexpr uint64_t pointer_starts(uint32_t codes) {
+  uint64_t bytes = codes;  // a byte for each code
+  bytes = (bytes | bytes << 24) & 0x000000ff000000ffu;
+  bytes = (bytes | bytes << 12) & 0x000f000f000f000fu;
+  bytes = (bytes | bytes << 6) & 0x0303030303030303u;
+  bytes += (bytes | bytes >> 1) & 0x0101010101010101u;
+  return bytes * 0x0101010101010100u;
+}
+
 /// Octants whose code is not 0.
 VOX_HD constexpr uint32_t octants_of_codes(uint32_t codes) {
   uint32_t mask = (codes | codes >> 1) & 0x5555;

@@ -24,8 +24,8 @@ struct CastParams {
   double pixel;                          ///< width of a pixel at distance 1 along the axis
   double edge;                           ///< smallest edge of a voxel, world units
   double cone;                           ///< width of a pixel at distance 1 in voxels; 0: all detail
-  int coarsest;                          ///< log2 of the edge of the coarsest cells that are fine enough
-  bool skip;                             ///< step over cells, not voxels
+  int coarsest;  ///< of surfaces, unless cone is 0: log2 of the edge of the coarsest cells that rays look at
+  bool skip;     ///< step over cells, not voxels
   ColorOf color_of;
   Glimpse* glimpses = nullptr;  ///< of surfaces, unless cone is 0: Beam::most_cells a pixel
 };
@@ -69,6 +69,14 @@ VOX_HD_HOT int finest_log2(double width) {
   return width >= 2 ? static_cast<int>(std::bit_cast<uint64_t>(width) >> 52) - 1023 : -1;
 }
 
+/// The same for surfaces, where cells have 4^3 parts, and are words at least: half a level finer, as a part
+/// hides all that is behind it, however little of it is there.
+VOX_HD_HOT int finest_parts_log2(double width) {
+  if (!(width >= 2)) return -1;
+  const int log2_edge = finest_log2(width * 0.70710678118654752);
+  return log2_edge < 2 ? 2 : log2_edge;
+}
+
 /// Follows a ray over the cells of a grid, from the voxel that it is in. Nothing was found so far.
 template <class Cursor>
 VOX_HD_HOT void follow(const CastParams& params, GridRay& ray, Cursor& cursor, int x, int y, Pixel& pixel,
@@ -105,7 +113,8 @@ VOX_HD_HOT void follow_levels(const CastParams& params, GridRay& ray, Cursor& cu
   bool clear = true;  // nothing was found, or hardly anything
   for (bool inside = true; inside;) {
     const uint32_t voxel[3] = {ray.voxel(0), ray.voxel(1), ray.voxel(2)};
-    const auto& cell = cursor.locate(voxel[0], voxel[1], voxel[2], finest_log2(cone * ray.t()));
+    const double width = cone * ray.t();
+    const auto& cell = cursor.locate(voxel[0], voxel[1], voxel[2], finest_parts_log2(width));
     ++detail.cells;
     if (params.color_of.is_void(cell.value)) {
       inside = cell.leave(ray);
@@ -118,7 +127,8 @@ VOX_HD_HOT void follow_levels(const CastParams& params, GridRay& ray, Cursor& cu
       constexpr int significant = 3;
       if (clear && (detail.voxel[0] < 0 || ninths >= significant)) found(voxel, t * length, pixel, detail);
       clear &= ninths < significant;
-      *glimpse = {{}, static_cast<int16_t>(log2_edge), static_cast<int16_t>(ninths)};
+      const int seen = finest_log2(width) > log2_edge ? finest_log2(width) : log2_edge;
+      *glimpse = {{}, static_cast<int16_t>(log2_edge == 0 ? 0 : seen), static_cast<int16_t>(ninths)};
       for (int a = 0; a < 3; ++a) glimpse->voxel[a] = static_cast<int32_t>(voxel[a]);
       ++glimpse;
     }

@@ -74,7 +74,7 @@ Result<CastParams> cast_params(const VolumeInfo& info, const Camera& camera, con
   const double cone = params.pixel / params.edge;
   if (options.level_of_detail && cone * farthest >= 2) {
     params.cone = cone;
-    params.coarsest = finest_log2(cone * farthest);
+    params.coarsest = finest_parts_log2(cone * farthest);
   }
   bound_pixels(rays, transform, params);
   return params;

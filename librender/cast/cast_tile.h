@@ -45,7 +45,7 @@ template <int width, int height, class Cursor, class Keep>
     uint32_t voxel[3] = {};
     while (rays.moving(i)) {
       for (int a = 0; a < 3; ++a) voxel[a] = mirror.voxel(a, rays.voxel(i, a));
-      cell = &cursor.locate(voxel[0], voxel[1], voxel[2], levels ? finest_log2(cone * rays.t(i)) : -1);
+      cell = &cursor.locate(voxel[0], voxel[1], voxel[2], levels ? finest_parts_log2(cone * rays.t(i)) : -1);
       if (!cell->is_void_to_all()) break;
       const Mirror::Box box = mirror(cell->box.lo, cell->box.hi);
       trail.add(box);

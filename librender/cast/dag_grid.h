@@ -24,7 +24,7 @@ struct DagCastView {
       if (dag_.height == color::leaf_height) leaf_ = dag_.leaf(dag_.root);
     }
     /// The value of a cell that is not void is its height, opaque. `finest`: cells of edge 2^finest are fine
-    /// enough, and leaf words where that is 1 and more; -1: all detail.
+    /// enough, at least 2; -1: all detail.
     VOX_HD_HOT Cell locate(uint32_t x, uint32_t y, uint32_t z, int finest) {
       const uint32_t apart = (x ^ x_) | (y ^ y_) | (z ^ z_);
       // Nodes of this height and above are those of the last voxel.
@@ -47,7 +47,8 @@ struct DagCastView {
       if (lowest_ != color::leaf_height) leaf_ = dag_.leaf(pointer(color::leaf_height));
       lowest_ = color::leaf_height;
       const uint64_t leaf = leaf_;
-      if (finest > 0 && leaf != 0) return {opaque_cell(color::leaf_height), color::leaf_height};
+      if (finest >= color::leaf_height && leaf != 0)
+        return {opaque_cell(color::leaf_height), color::leaf_height};
       const uint32_t octant = (x >> 1 & 1) | (y & 2) | (z & 2) << 1;
       const auto eight = static_cast<uint32_t>(leaf >> 8 * octant & 0xff);
       if (eight == 0) return {{}, leaf == 0 ? color::leaf_height : 1};

@@ -1,7 +1,5 @@
 #include "librender/cast/glimpses.h"
 
-#include "libcolor/params.h"
-
 namespace voxkit::render {
 
 Result<CastParams> surface_params(const color::Volume& volume, const Camera& camera,

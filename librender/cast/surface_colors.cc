@@ -37,7 +37,7 @@ Status look_up_colors(const color::Volume& volume, const Glimpse* glimpses, Fram
       }
       const Glimpse* glimpse = glimpses + i * Beam::most_cells;
       for (int n = 0; n < Beam::most_cells && glimpse->ninths > 0; ++n, ++glimpse) {
-        const Color seen = look_up(glimpse->voxel, glimpse->log2_edge);
+        const Color seen = look_up(glimpse->voxel, std::min<int>(glimpse->log2_edge, dag->height));
         const float share = static_cast<float>(glimpse->ninths) * (1.0f / 9);
         for (int k = 0; k < 3; ++k) pixel[k] += share * seen.rgb[k];
       }
