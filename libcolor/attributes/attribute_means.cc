@@ -66,7 +66,7 @@ AttributeSums AttributeMeans::of(std::span<const std::byte> voxel) const {
   return sums;
 }
 
-void AttributeMeans::put(const AttributeSums& sums, int height, std::span<std::byte> cell) const {
+void AttributeMeans::put(const AttributeSums& sums, std::span<std::byte> cell) const {
   const auto set = [&](Attribute a, uint32_t value) {
     put_value(value, kind_of(a).bytes, &cell[set_.offset(a)]);
   };
@@ -78,11 +78,7 @@ void AttributeMeans::put(const AttributeSums& sums, int height, std::span<std::b
       value |= static_cast<uint32_t>(tables_.stored[mean(sums.light[i])]) << 8 * i;
     set(Attribute::emissive, value);
   }
-  if (set_.has(Attribute::opacity)) {
-    const uint64_t places = uint64_t{1} << 3 * height;
-    set(Attribute::opacity,
-        static_cast<uint32_t>(std::max<uint64_t>(1, (sums.opacity + places / 2) / places)));
-  }
+  if (set_.has(Attribute::opacity)) set(Attribute::opacity, std::max(mean(sums.opacity), 1u));
   if (set_.has(Attribute::normal)) {
     const auto c = [&](size_t i) { return static_cast<double>(sums.normal[i]); };
     const Octahedral o = octahedral_of(c(0), c(1), c(2));
@@ -99,7 +95,7 @@ void AttributeCells::close(size_t height, std::vector<std::byte>& values) {
     sums_[height + 1].add(sums);
   } else {
     values.resize(values.size() + bytes_);
-    means_.put(sums, static_cast<int>(height), std::span(values).last(bytes_));
+    means_.put(sums, std::span(values).last(bytes_));
   }
   sums = {};
 }

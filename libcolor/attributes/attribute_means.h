@@ -34,10 +34,10 @@ class AttributeMeans {
   explicit AttributeMeans(AttributeSet set) : set_(set), tables_(light_tables()) {}
   /// Those of a voxel.
   AttributeSums of(std::span<const std::byte> voxel) const;
-  /// Writes those of a cell of a height with at least one voxel: means, each rounded once; of opacity that
-  /// over the whole cell, where no voxel is 0, but at least 1; of normals their direction; of ids the one
-  /// that most of the octants' voxels have, each octant all those of its own, and of equally many the least.
-  void put(const AttributeSums& elected, int height, std::span<std::byte> cell) const;
+  /// Writes those of a cell with at least one voxel: means over its voxels, each rounded once, of opacity at
+  /// least 1; of normals their direction; of ids the one that most of the octants' voxels have, each octant
+  /// all those of its own, and of equally many the least.
+  void put(const AttributeSums& elected, std::span<std::byte> cell) const;
 
  private:
   AttributeSet set_;

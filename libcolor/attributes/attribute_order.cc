@@ -22,10 +22,10 @@ class AttributesOut {
     if (all_) out_.resize(room + bytes_);
     return room;
   }
-  void end(size_t room, int height, Sums& sums) {
+  void end(size_t room, int, Sums& sums) {
     if (!all_) return;
     sums.elect();
-    means_.put(sums, height, std::span(out_).subspan(room, bytes_));
+    means_.put(sums, std::span(out_).subspan(room, bytes_));
   }
 
  private:

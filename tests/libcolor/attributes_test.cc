@@ -236,7 +236,7 @@ TEST(Attributes, CellsHaveMeans) {
     for (size_t a = 0; a < 2; ++a) rm[a] += m >> 8 * a & 255;
   }
   const auto n = static_cast<double>(voxels.size());
-  EXPECT_EQ(value_in(root, set, 0, Attribute::opacity), std::lround(opacity / 512));
+  EXPECT_EQ(value_in(root, set, 0, Attribute::opacity), std::lround(opacity / n));
   const uint32_t m = value_in(root, set, 0, Attribute::rm), e = value_in(root, set, 0, Attribute::emissive);
   for (size_t a = 0; a < 2; ++a) EXPECT_EQ(m >> 8 * a & 255, std::lround(rm[a] / n));
   for (size_t a = 0; a < 3; ++a)
