@@ -161,7 +161,8 @@ color::ColorCodec codec_of(const Options& o) {
   using color::ColorCodec;
   if (!o.codec.empty()) return *color::codec_named(o.codec);
   const bool storage = o.purpose == "storage";
-  if (o.names.size() == 1 && has_ending(o.names.front(), ".vox") && !o.threshold && o.colors == "leaf")
+  if (o.names.size() == 1 && has_ending(o.names.front(), ".vox") && !o.threshold && o.colors == "leaf" &&
+      o.encoder.simplify == 0)
     return storage ? ColorCodec::raw
                    : ColorCodec::palette;  // equal runs of raw colours take zstd next to nothing
   const bool fits = o.colors == "leaf" && o.curve == "morton" && o.space == "srgb";

@@ -82,16 +82,19 @@ Result<Mesh> mesh_of_points(const PointCloud& points, Context& ctx) {
   mesh.positions.reserve(points.size());
   mesh.colors.reserve(points.size());
   mesh.points.reserve(points.size());
+  bool faint = false;
   VOX_CHECK(points.read([&](std::span<const CloudPoint> run) -> Status {
     for (const CloudPoint& point : run) {
       const auto light = [&](size_t c) { return static_cast<float>(srgb_to_linear(point.color[c] / 255.0)); };
       mesh.points.push_back({static_cast<uint32_t>(mesh.positions.size()), 0});
       mesh.positions.push_back(point.at);
-      mesh.colors.emplace_back(light(0), light(1), light(2), 1.0f);
+      mesh.colors.emplace_back(light(0), light(1), light(2), static_cast<float>(point.alpha) / 255);
+      faint |= point.alpha < 255;
     }
     return {};
   }));
   mesh.materials.emplace_back();
+  if (faint) mesh.materials.front().alpha_mode = AlphaMode::blend;
   mesh.notes = points.notes();
   if (mesh.points.size() < points.size())
     mesh.notes.push_back(

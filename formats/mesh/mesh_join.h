@@ -12,8 +12,8 @@ namespace voxkit {
 /// Moves a mesh, and its grid of voxels, if it has one.
 void move_mesh(Mesh& mesh, const glm::dvec3& by);
 
-/// Places and colours of points as a mesh that has only such, to be joined with others: 48 bytes each, which
-/// count against ctx.memory. Errors: ErrorCode::limit; those of reading them.
+/// Places, colours and opacities of points as a mesh that has only such, to be joined with others: 48 bytes
+/// each, which count against ctx.memory. Errors: ErrorCode::limit; those of reading them.
 Result<Mesh> mesh_of_points(const PointCloud& points, Context& ctx);
 
 /// Meshes that lie in one world, one after the other: so are the numbers of their materials. Grids of voxels

@@ -171,9 +171,18 @@ Surface open_surfaces(std::span<const PlacedInput> inputs, const SurfaceOptions&
     }
     meshes_of.push_back(&input);
   }
-  if (!meshes_of.empty())  // points of meshes have places and colours: the rest is named as dropped
+  if (!meshes_of
+           .empty())  // points of meshes have places, colours and opacities: the rest is named as dropped
     for (size_t i = 0; i < clouds.size(); ++i) {
-      VOX_TRY(clouds[i].points, named(open_points(clouds_of[i]->name), clouds_of[i]->name));
+      for (const color::Attribute a : {color::Attribute::normal, color::Attribute::rm, color::Attribute::id})
+        if (is_wanted(options, a))
+          return fail(
+              ErrorCode::usage, clouds_of[i]->name,
+              fmt::format("--attributes: points beside a mesh have no {}: expected color and opacity, or a "
+                          "file for each",
+                          color::kind_of(a).name));
+      const PointExtras opacity{.alpha = point_extras(options).alpha};
+      VOX_TRY(clouds[i].points, named(open_points(clouds_of[i]->name, opacity), clouds_of[i]->name));
     }
   std::vector<Mesh> meshes;
   for (const PlacedInput* input : meshes_of) {
