@@ -7,6 +7,7 @@
 #include <vector>
 
 #include "formats/mesh/point_cloud.h"
+#include "libcolor/surface/heaviest.h"
 #include "libcolor/surface/linear_light.h"
 #include "libcolor/surface/octahedral.h"
 #include "libcolor/surface/surface.h"
@@ -88,7 +89,7 @@ class PointMeans {
     if (attributes_.has(Attribute::rm))
       for (const uint64_t sum : rm_) byte(mean(sum));
     if (attributes_.has(Attribute::id)) {
-      const uint32_t label = commonest();
+      const uint32_t label = heaviest(labels_);
       for (int shift = 0; shift < 32; shift += 8) byte(label >> shift & 255);
     }
     light_ = {}, rm_ = {}, normal_ = {}, weight_ = count_ = 0, most_ = 0;
@@ -99,18 +100,6 @@ class PointMeans {
     voxels_.clear();
     bytes_.clear();
     return {};
-  }
-  uint32_t commonest() {
-    std::sort(labels_.begin(), labels_.end());
-    uint32_t best = 0;
-    uint64_t most = 0;
-    for (size_t i = 0; i < labels_.size();) {
-      const uint32_t label = labels_[i].first;
-      uint64_t sum = 0;
-      for (; i < labels_.size() && labels_[i].first == label; ++i) sum += labels_[i].second;
-      if (sum > most) best = label, most = sum;
-    }
-    return best;
   }
 
   const SurfaceSource::Sink& sink_;

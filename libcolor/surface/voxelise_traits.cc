@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cmath>
 
+#include "libcolor/surface/heaviest.h"
 #include "libcolor/surface/linear_light.h"
 #include "libcolor/surface/octahedral.h"
 
@@ -113,20 +114,6 @@ void TraitMean::add(const Traits& traits, double area) {
   ids_.back().second += weight;
 }
 
-uint32_t TraitMean::heaviest() const {
-  auto ids = ids_;
-  std::sort(ids.begin(), ids.end());
-  uint32_t best = 0;
-  uint64_t most = 0;
-  for (size_t i = 0; i < ids.size();) {
-    const uint32_t id = ids[i].first;
-    uint64_t sum = 0;
-    for (; i < ids.size() && ids[i].first == id; ++i) sum += ids[i].second;
-    if (sum > most) best = id, most = sum;
-  }
-  return best;
-}
-
 void TraitMean::append_to(std::vector<std::byte>& out, AttributeSet attributes) const {
   const auto put = [&](uint8_t value) { out.push_back(std::byte{value}); };
   if (attributes.has(Attribute::emissive))
@@ -141,7 +128,8 @@ void TraitMean::append_to(std::vector<std::byte>& out, AttributeSet attributes) 
   if (attributes.has(Attribute::rm))
     for (const uint16_t part : mean(rm_)) put(byte_of(part));
   if (attributes.has(Attribute::id)) {
-    const uint32_t id = heaviest();
+    auto ids = ids_;
+    const uint32_t id = heaviest(ids);
     for (int shift = 0; shift < 32; shift += 8) put(static_cast<uint8_t>(id >> shift));
   }
 }

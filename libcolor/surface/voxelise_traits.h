@@ -59,7 +59,6 @@ class TraitMean {
     for (size_t c = 0; c < n; ++c) out[c] = static_cast<uint16_t>((sums[c] + weight_ / 2) / weight_);
     return out;
   }
-  uint32_t heaviest() const;
 
   uint8_t most_ = 0;
   uint64_t area_ = 0, covered_ = 0;  ///< covered: area times cover
