@@ -15,10 +15,13 @@ inline AttributeSet all_attributes() {
   for (size_t i = 0; i < attribute_kinds.size(); ++i) set.add(static_cast<Attribute>(i));
   return set;
 }
-inline AttributeSet only(Attribute attribute) {
+inline AttributeSet set_of(std::initializer_list<Attribute> attributes) {
   AttributeSet set;
-  set.add(attribute);
+  for (const Attribute a : attributes) set.add(a);
   return set;
+}
+inline AttributeSet only(Attribute attribute) {
+  return set_of({attribute});
 }
 
 /// What values are like, one after the other.

@@ -10,16 +10,11 @@
 #include "libcolor/surface/point_surface.h"
 #include "libcolor/surface/volume_surface.h"
 #include "libcolor/surface/voxel_list.h"
+#include "tests/libcolor/attribute_scenes.h"
 #include "tests/libcolor/scenes.h"
 
 namespace voxkit::color {
 namespace {
-
-AttributeSet set_of(std::initializer_list<Attribute> attributes) {
-  AttributeSet set;
-  for (const Attribute a : attributes) set.add(a);
-  return set;
-}
 
 class ListCloud final : public PointCloud {
  public:

@@ -4,18 +4,13 @@
 
 #include "libcolor/surface/linear_light.h"
 #include "libcolor/surface/octahedral.h"
+#include "tests/libcolor/attribute_scenes.h"
 #include "tests/libcolor/meshes.h"
 
 namespace voxkit::color {
 namespace {
 
-AttributeSet set_of(std::initializer_list<Attribute> attributes) {
-  AttributeSet set;
-  for (const Attribute a : attributes) set.add(a);
-  return set;
-}
-const AttributeSet all =
-    set_of({Attribute::emissive, Attribute::opacity, Attribute::normal, Attribute::rm, Attribute::id});
+const AttributeSet all = all_attributes();
 
 /// A voxel and all that it has.
 struct Voxel {
