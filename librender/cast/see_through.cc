@@ -1,12 +1,11 @@
 #include "librender/cast/see_through.h"
 
-#include <algorithm>
 #include <atomic>
 #include <span>
 
 #include "formats/clock.h"
-#include "formats/parallel.h"
 #include "librender/cast/beam.h"
+#include "librender/cast/pixel_rows.h"
 #include "librender/cast/translucent_view.h"
 
 namespace voxkit::render {
@@ -14,19 +13,13 @@ namespace {
 
 using color::Attribute;
 
-/// Calls `visit`, with a worker that `make` makes for each thread's rows, for each pixel.
-template <class Make, class Visit>
-Status for_each_pixel(const Frame& frame, Context& ctx, const Make& make, const Visit& visit) {
-  constexpr int rows = 16;
-  return parallel_for(ctx, (frame.height + rows - 1) / rows, [&](int64_t task) -> Status {
-    auto worker = make();
-    const int first = static_cast<int>(task) * rows, last = std::min(first + rows, frame.height);
-    for (int y = first; y < last; ++y)
-      for (int x = 0; x < frame.width; ++x)
-        visit(worker, x, y,
-              static_cast<size_t>(y) * static_cast<size_t>(frame.width) + static_cast<size_t>(x));
-    return {};
-  });
+struct Place {
+  int x, y;
+};
+
+Place place_of(size_t pixel, const Frame& frame) {
+  const auto width = static_cast<size_t>(frame.width);
+  return {static_cast<int>(pixel % width), static_cast<int>(pixel / width)};
 }
 
 /// Whether voxels let something through.
@@ -67,7 +60,7 @@ Result<std::vector<uint8_t>> see_through(const color::Volume& volume, const colo
       [&] {
         return Worker{Opacities(volume, dag), view.cursor()};
       },
-      [&](Worker& worker, int x, int y, size_t i) {
+      [&](Worker& worker, size_t i) {
         if (frame.details[i].voxel[0] < 0) return;
         bool translucent = false;
         if (glimpses == nullptr) {
@@ -84,6 +77,7 @@ Result<std::vector<uint8_t>> see_through(const color::Volume& volume, const colo
         pixels[i] = 1;
         frame.pixels[i] = {};
         frame.details[i] = {};
+        const auto [x, y] = place_of(i, frame);
         cast_ray(params, worker.cursor, x, y, frame.pixels[i], frame.details[i]);
         cells += frame.details[i].cells;
       }));
@@ -100,10 +94,11 @@ Status shine_through(const color::Volume& volume, const color::DagView& dag, con
   const TranslucentView<Search::path> view{&volume, &dag, true};
   VOX_CHECK(for_each_pixel(
       frame, ctx, [&] { return view.cursor(); },
-      [&](auto& cursor, int x, int y, size_t i) {
+      [&](auto& cursor, size_t i) {
         if (pixels[i] == 0) return;
         Pixel light;
         PixelDetail detail;
+        const auto [x, y] = place_of(i, frame);
         cast_ray(params, cursor, x, y, light, detail);
         for (int k = 0; k < 3; ++k) frame.traits[i].emissive[k] = light.color[k];
       }));

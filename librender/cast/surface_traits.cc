@@ -6,12 +6,12 @@
 #include <optional>
 
 #include "formats/clock.h"
-#include "formats/parallel.h"
 #include "libcolor/attribute_reader.h"
 #include "libcolor/store.h"
 #include "libcolor/surface/morton.h"
 #include "libcolor/surface/octahedral.h"
 #include "librender/cast/beam.h"
+#include "librender/cast/pixel_rows.h"
 
 namespace voxkit::render {
 namespace {
@@ -49,45 +49,46 @@ Status look_up_traits(const color::Volume& volume, color::AttributeSet wanted, c
   VOX_TRY(const color::DagView* const dag, volume.store().dag(volume.container(), volume.params()));
   const GridTransform grid(volume.info());
   const glm::dmat3 to_world = glm::transpose(grid.along);
-  constexpr int64_t rows = 16;
-  VOX_CHECK(parallel_for(ctx, (frame.height + rows - 1) / rows, [&](int64_t task) -> Status {
+  struct Worker {
     std::array<std::optional<color::AttributeReader>, color::attribute_kinds.size()> readers;
-    for (size_t i = 0; i < readers.size(); ++i)
-      if (const auto attribute = static_cast<Attribute>(i); frame.has.has(attribute))
-        readers[i].emplace(volume.store(), volume.container(), volume.params(), attribute);
-    const auto read = [&](Attribute attribute, uint64_t index) -> std::optional<uint32_t> {
+    color::CellFinder finder;
+    std::optional<uint32_t> read(Attribute attribute, uint64_t index) {
       auto& reader = readers[static_cast<size_t>(attribute)];
       return reader ? std::optional(reader->value(index)) : std::nullopt;
-    };
-    color::CellFinder finder(*dag);
-    const int64_t width = frame.width, first = task * rows * width,
-                  last = std::min<int64_t>((task + 1) * rows, frame.height) * width;
-    for (int64_t i = first; i < last; ++i) {
-      PixelTraits& traits = frame.traits[static_cast<size_t>(i)];
-      traits = {};
-      const int32_t(&voxel)[3] = frame.details[static_cast<size_t>(i)].voxel;
-      if (voxel[0] < 0) continue;
-      const uint64_t place = color::morton_code(
-          static_cast<uint32_t>(voxel[0]), static_cast<uint32_t>(voxel[1]), static_cast<uint32_t>(voxel[2]));
-      const auto found = finder.find(place, glimpses ? height_at(glimpses + i * Beam::most_cells, voxel) : 0);
-      if (!found.there) continue;
-      const uint64_t index = found.color;
-      if (const auto light = read(Attribute::emissive, index))
-        for (int k = 0; k < 3; ++k) traits.emissive[k] = share(*light, k);
-      if (const auto opacity = read(Attribute::opacity, index)) traits.opacity = share(*opacity, 0);
-      if (const auto bytes = read(Attribute::normal, index)) {
-        const auto n = color::direction_of({static_cast<uint8_t>(*bytes), static_cast<uint8_t>(*bytes >> 8)});
-        const glm::dvec3 world =
-            glm::normalize(to_world * (glm::dvec3(static_cast<double>(n[0]), static_cast<double>(n[1]),
-                                                  static_cast<double>(n[2])) /
-                                       grid.voxel));
-        for (int k = 0; k < 3; ++k) traits.normal[k] = static_cast<float>(world[k]);
-      }
-      if (const auto rm = read(Attribute::rm, index))
-        for (int k = 0; k < 2; ++k) traits.rm[k] = share(*rm, k);
-      if (const auto id = read(Attribute::id, index)) traits.id = *id;
     }
-    return {};
+  };
+  const auto make = [&] {
+    Worker worker{{}, color::CellFinder(*dag)};
+    for (size_t i = 0; i < worker.readers.size(); ++i)
+      if (const auto attribute = static_cast<Attribute>(i); frame.has.has(attribute))
+        worker.readers[i].emplace(volume.store(), volume.container(), volume.params(), attribute);
+    return worker;
+  };
+  VOX_CHECK(for_each_pixel(frame, ctx, make, [&](Worker& worker, size_t i) {
+    PixelTraits& traits = frame.traits[i];
+    traits = {};
+    const int32_t(&voxel)[3] = frame.details[i].voxel;
+    if (voxel[0] < 0) return;
+    const uint64_t place = color::morton_code(
+        static_cast<uint32_t>(voxel[0]), static_cast<uint32_t>(voxel[1]), static_cast<uint32_t>(voxel[2]));
+    const auto found =
+        worker.finder.find(place, glimpses ? height_at(glimpses + i * Beam::most_cells, voxel) : 0);
+    if (!found.there) return;
+    const uint64_t index = found.color;
+    if (const auto light = worker.read(Attribute::emissive, index))
+      for (int k = 0; k < 3; ++k) traits.emissive[k] = share(*light, k);
+    if (const auto opacity = worker.read(Attribute::opacity, index)) traits.opacity = share(*opacity, 0);
+    if (const auto bytes = worker.read(Attribute::normal, index)) {
+      const auto n = color::direction_of({static_cast<uint8_t>(*bytes), static_cast<uint8_t>(*bytes >> 8)});
+      const glm::dvec3 world =
+          glm::normalize(to_world * (glm::dvec3(static_cast<double>(n[0]), static_cast<double>(n[1]),
+                                                static_cast<double>(n[2])) /
+                                     grid.voxel));
+      for (int k = 0; k < 3; ++k) traits.normal[k] = static_cast<float>(world[k]);
+    }
+    if (const auto rm = worker.read(Attribute::rm, index))
+      for (int k = 0; k < 2; ++k) traits.rm[k] = share(*rm, k);
+    if (const auto id = worker.read(Attribute::id, index)) traits.id = *id;
   }));
   const double seconds = seconds_since(start);
   frame.lookup_seconds += seconds;
