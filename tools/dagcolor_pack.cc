@@ -4,6 +4,7 @@
 #include <algorithm>
 #include <glm/vec3.hpp>
 #include <map>
+#include <set>
 
 #include "formats/names.h"
 #include "formats/output_file.h"
@@ -24,11 +25,12 @@ struct Options {
   std::map<size_t, glm::dvec3> places;  ///< of inputs that are moved
   std::string output, tiles;
   SurfaceOptions surface;
-  std::string kind = "thin", codec, image_curve = "morton", curve = "morton", colors = "leaf",
-              counts = "node", space = "srgb", emissive = "add", geometry = "auto", purpose = "access";
+  std::string kind = "thin", codec, image_curve, curve = "morton", colors = "leaf", counts = "node", space,
+              emissive = "add", geometry = "auto", purpose = "access";
   color::Options encoder;
   std::optional<double> threshold;
   std::optional<uint32_t> palette;
+  std::optional<int> weight_bits, effort, quality;
   std::optional<color::AttributeSet> attributes;
   bool verify = false;
 };
@@ -90,7 +92,7 @@ void declare(CommandLine& line, Options& o) {
               "Of blocks: the threshold is a distance in srgb, of 0 to 255, or in lab: CIELAB, 1976 (srgb)",
               one_of(o.space, {"srgb", "lab"}));
   line.option("--weight-bits", "B", "Of fws: bits of a weight, 1 to 4 (3)",
-              integer(o.encoder.weight_bits, 1, color::most_weight_bits));
+              integer(o.weight_bits, 1, color::most_weight_bits));
   line.option(
       "--palette", "N",
       "Of palette: colours of the scene's, 1 to 65536 (256). Of png: of each image, 2 to 256; 0: all (0)",
@@ -99,13 +101,13 @@ void declare(CommandLine& line, Options& o) {
       "--effort", "N",
       "Of blocks: 1: greedy merging, as published; up to 9: smaller files, slower; of textures: up to 9: "
       "nearer, slower; of palette: both (3)",
-      integer(o.encoder.effort, 1, 9));
+      integer(o.effort, 1, 9));
   line.option(
       "--quality", "Q",
       "Of astc: 100: blocks of 4 x 4, 8 bits a colour; down to 0: of 12 x 12, 0.89 bits. Of jpeg: that "
       "of libjpeg. Of jp2: 100: lossless; 80: a fifth of 24 bits; half as many for each 20 less. Of "
       "png: 100: lossless; else that of libimagequant (100)",
-      integer(o.encoder.quality, 0, 100));
+      integer(o.quality, 0, 100));
   line.option("--image-curve", "CURVE",
               "Of textures and images: colours are laid along a curve: morton or hilbert (morton)",
               one_of(o.image_curve, {"morton", "hilbert"}));
@@ -165,7 +167,7 @@ color::ColorCodec codec_of(const Options& o) {
       o.encoder.simplify == 0)
     return storage ? ColorCodec::raw
                    : ColorCodec::palette;  // equal runs of raw colours take zstd next to nothing
-  const bool fits = o.colors == "leaf" && o.curve == "morton" && o.space == "srgb";
+  const bool fits = o.colors == "leaf" && o.curve == "morton" && o.space != "lab";
   return storage && fits ? ColorCodec::predicted : ColorCodec::vws;
 }
 
@@ -173,6 +175,9 @@ color::Options encoder_options(const Options& o) {
   color::Options options = o.encoder;
   options.codec = codec_of(o);
   options.threshold = o.threshold.value_or(options.threshold);
+  options.weight_bits = o.weight_bits.value_or(options.weight_bits);
+  options.effort = o.effort.value_or(options.effort);
+  options.quality = o.quality.value_or(options.quality);
   if (o.palette && options.codec == color::ColorCodec::palette) options.palette = *o.palette;
   if (o.palette && options.codec == color::ColorCodec::png)
     options.image_palette = static_cast<int>(*o.palette);
@@ -185,6 +190,37 @@ color::Options encoder_options(const Options& o) {
   if (options.for_storage && options.zstd == 0) options.zstd = most_zstd_level;
   options.counts = o.counts == "pointer" ? color::Counts::pointer : color::Counts::node;
   return options;
+}
+
+/// Options that were given and that had no effect, in words.
+std::vector<std::string> unused_options(const Options& o, const color::Report& report) {
+  using enum color::ColorCodec;
+  const color::ColorCodec codec = report.params.codec;
+  const bool blocks = codec == fws || codec == vws, texture = codec == bc1 || codec == bc7 || codec == astc,
+             image = codec == jpeg || codec == jp2 || codec == png;
+  const struct {
+    const char* name;
+    bool given, used;
+  } options[] = {
+      {"--threshold", o.threshold.has_value(), color::has_threshold(codec)},
+      {"--space", !o.space.empty(), blocks || codec == predicted},
+      {"--weight-bits", o.weight_bits.has_value(), codec == fws},
+      {"--palette", o.palette.has_value(), codec == palette || codec == png},
+      {"--effort", o.effort.has_value(), blocks || texture || codec == palette || !report.attributes.empty()},
+      {"--quality", o.quality.has_value(), codec == astc || image},
+      {"--image-curve", !o.image_curve.empty(), texture || image},
+  };
+  std::vector<std::string> notes;
+  for (const auto& option : options)
+    if (option.given && !option.used)
+      notes.push_back(
+          fmt::format("{}: --codec {} has no use for it", option.name, color::part_codec(codec).name));
+  std::set<color::Attribute> has;
+  for (const color::AttributeParams& attribute : report.attributes) has.insert(attribute.attribute);
+  for (size_t i = 0; i < o.encoder.attribute_thresholds.size(); ++i)
+    if (o.encoder.attribute_thresholds[i] && !has.contains(static_cast<color::Attribute>(i)))
+      notes.push_back(fmt::format("--attribute-threshold: it has no {}", color::attribute_kinds[i].name));
+  return notes;
 }
 
 /// The inputs, in words.
@@ -265,7 +301,7 @@ Result<int> work(const Options& o, Run& run) {
   run.stage("read");
   VOX_TRY(TiledSurface opened, open_what(o, options, run.ctx));
   const VolumeInfo info = opened.source->info();
-  const std::vector<std::string> notes = printable(opened.source->notes());
+  std::vector<std::string> notes = printable(opened.source->notes());
   const bool emits = opened.source->emits();
   VOX_TRY(auto out, OutputFile::create(o.output, run.options.force));
   run.stage("encode");
@@ -305,6 +341,9 @@ Result<int> work(const Options& o, Run& run) {
   VOX_CHECK(out->commit());
   for (const std::string& note : notes)
     run.say(o.names.size() > 1 ? note : fmt::format("{}: {}", input, note));
+  const std::vector<std::string> unused = unused_options(o, report);
+  for (const std::string& note : unused) run.say(note);
+  notes.insert(notes.end(), unused.begin(), unused.end());
   if (run.options.json) VOX_CHECK(print(json_of(encoding, run, report, o, notes, diff).text()));
   if (!run.options.quiet && !run.options.json)
     tell(fmt::format(

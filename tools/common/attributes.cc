@@ -65,7 +65,9 @@ Parser attribute_thresholds(Thresholds& value) {
       if (sign == std::string::npos || !attribute || *attribute == color::Attribute::id)
         return bad_usage(
             fmt::format("\"{}\": expected emissive, opacity, normal or rm, and =E, such as opacity=4", part));
-      VOX_TRY(value[static_cast<size_t>(*attribute)], read_number(part.substr(sign + 1), 0, 1e6));
+      std::optional<double>& threshold = value[static_cast<size_t>(*attribute)];
+      if (threshold) return bad_usage(fmt::format("\"{}\": expected each attribute once", part));
+      VOX_TRY(threshold, read_number(part.substr(sign + 1), 0, 1e6));
     }
     return {};
   };
