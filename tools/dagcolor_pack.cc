@@ -60,7 +60,9 @@ void declare(CommandLine& line, Options& o) {
   line.option("--surface", "KIND",
               "Of a mesh: thin: no more voxels than make it tight; conservative: all that it touches (thin)",
               one_of(o.kind, {"thin", "conservative"}));
-  line.option("--emissive", "HOW", "Of a mesh: light that it emits: add: to its colors; drop (add)",
+  line.option("--emissive", "HOW",
+              "Of a mesh: light that it emits: add: to its colors; drop. Of points: drop: without that "
+              "attribute (add)",
               one_of(o.emissive, {"add", "drop"}));
   line.option(
       "--attributes", "LIST",

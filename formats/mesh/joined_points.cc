@@ -15,8 +15,15 @@ class JoinedPoints final : public PointCloud {
       has_.normals |= has.normals;
       has_.rm |= has.rm;
       has_.labels |= has.labels;
+      has_.emission |= has.emission;
       for (const std::string& note : cloud.points->notes()) notes_.push_back(cloud.prefix + note);
+      if (clouds_.size() > 1 && cloud.points->grid())
+        notes_.push_back(cloud.prefix + "its own grid of voxels is dropped: there is one around all inputs");
     }
+    if (clouds_.size() > 1) return;
+    grid_ = clouds_.front().points->grid();
+    for (size_t c = 0; grid_ && c < 3; ++c)
+      grid_->affine.origin[c] += clouds_.front().by[static_cast<glm::length_t>(c)];
   }
   Status read(const Sink& sink) const override {
     std::vector<CloudPoint> moved;

@@ -96,6 +96,8 @@ Result<Mesh> mesh_of_points(const PointCloud& points, Context& ctx) {
   mesh.materials.emplace_back();
   if (faint) mesh.materials.front().alpha_mode = AlphaMode::blend;
   mesh.notes = points.notes();
+  if (points.grid())
+    mesh.notes.emplace_back("its own grid of voxels is dropped: there is one around all inputs");
   if (mesh.points.size() < points.size())
     mesh.notes.push_back(
         fmt::format("{} of {} points are dropped: they are at coordinates that are not finite, or less "

@@ -9,6 +9,8 @@
 #include <optional>
 #include <utility>
 
+#include "formats/mesh/voxel_grid.h"
+
 namespace voxkit::ply {
 namespace {
 
@@ -56,6 +58,9 @@ Role role_of(std::string_view element, std::string_view property, bool list) {
                                                                {"metallic", metalness},
                                                                {"metalness", metalness},
                                                                {"metallicness", metalness},
+                                                               {"emissive_red", emissive_red},
+                                                               {"emissive_green", emissive_green},
+                                                               {"emissive_blue", emissive_blue},
                                                                {"label", label},
                                                                {"class", label},
                                                                {"classification", label},
@@ -150,6 +155,8 @@ Result<Header> read_header(std::span<const std::byte> bytes, const std::string& 
     if (words[0] == "comment") {
       if (words.size() > 2 && words[1] == "TextureFile")
         header.pictures.emplace_back(words[2].data(), words.back().data() + words.back().size());
+      if (words.size() > 2 && words[1] == voxel_grid_name)
+        header.grid = parse_voxel_grid({words[2].data(), words.back().data() + words.back().size()});
     } else if (words[0] == "end_header") {
       header.end = at;
       if (!has_format) return broken("no format is named");

@@ -4,12 +4,14 @@
 
 #include <cstddef>
 #include <cstdint>
+#include <optional>
 #include <span>
 #include <string>
 #include <string_view>
 #include <vector>
 
 #include "formats/result.h"
+#include "formats/volume.h"
 
 namespace voxkit::ply {
 
@@ -41,6 +43,9 @@ enum class Role : uint8_t {
   nz,
   roughness,
   metalness,
+  emissive_red,
+  emissive_green,
+  emissive_blue,
   label,
   intensity
 };
@@ -65,7 +70,8 @@ struct Header {
   bool ascii = false, big_endian = false;
   std::vector<Element> elements;
   std::vector<std::string> pictures;
-  size_t end = 0;  ///< where the data begins
+  std::optional<VolumeInfo> grid;  ///< as a comment says (voxel_grid.h)
+  size_t end = 0;                  ///< where the data begins
   /// Leaves out properties of these roles.
   void drop(Role first, Role last);
   /// What is dropped, properties that have no role, in a sentence; nothing where nothing is.

@@ -68,6 +68,12 @@ class PointFields {
       case Role::metalness:
         point.metalness = byte_of(value * scale_of(property.type));
         break;
+      case Role::emissive_red:
+      case Role::emissive_green:
+      case Role::emissive_blue:
+        point.emission[static_cast<size_t>(property.role) - static_cast<size_t>(Role::emissive_red)] =
+            byte_of(value * scale_of(property.type));
+        break;
       case Role::label:
         point.label = label_of(value);
         break;
@@ -97,9 +103,13 @@ class PlyPointCloud final : public PointCloud {
     has_ = {.alpha = element.has(Role::alpha),
             .normals = element.has(Role::nx) && element.has(Role::ny) && element.has(Role::nz),
             .rm = element.has(Role::roughness) || element.has(Role::metalness),
-            .labels = element.has(Role::label)};
+            .labels = element.has(Role::label),
+            .emission = element.has(Role::emissive_red) && element.has(Role::emissive_green) &&
+                        element.has(Role::emissive_blue)};
+    grid_ = header_.grid;
     if (!wanted.normals || !has_.normals) header_.drop(Role::nx, Role::nz);
     if (!wanted.rm) header_.drop(Role::roughness, Role::metalness);
+    if (!wanted.emission || !has_.emission) header_.drop(Role::emissive_red, Role::emissive_blue);
     if (!wanted.labels) header_.drop(Role::label, Role::label);
     if (element.has(Role::red)) header_.drop(Role::intensity, Role::intensity);
     notes_ = header_.notes();

@@ -8,6 +8,8 @@
 #include <limits>
 #include <vector>
 
+#include "formats/mesh/voxel_grid.h"
+
 namespace voxkit {
 
 bool needs_doubles(double from, double to, double step) {
@@ -17,14 +19,14 @@ bool needs_doubles(double from, double to, double step) {
   return std::ldexp(1, std::ilogb(std::max(furthest, 1e-300)) - 24) > std::abs(step) / 256;
 }
 
-Result<PlyPointWriter> PlyPointWriter::create(const std::string& path, uint64_t count, bool doubles,
-                                              bool force, std::span<const PlyProperty> more) {
+Result<PlyPointWriter> PlyPointWriter::create(const std::string& path, const VolumeInfo& grid, uint64_t count,
+                                              bool doubles, bool force, std::span<const PlyProperty> more) {
   VOX_TRY(auto out, OutputFile::create(path, force));
   std::string header = fmt::format(
-      "ply\nformat binary_little_endian 1.0\nelement vertex {0}\nproperty {1} x\nproperty {1} y\nproperty "
-      "{1} z\n"
+      "ply\nformat binary_little_endian 1.0\ncomment {2} {3}\nelement vertex {0}\nproperty {1} x\n"
+      "property {1} y\nproperty {1} z\n"
       "property uchar red\nproperty uchar green\nproperty uchar blue\n",
-      count, doubles ? "double" : "float");
+      count, doubles ? "double" : "float", voxel_grid_name, voxel_grid_text(grid));
   size_t more_bytes = 0;
   for (const PlyProperty& property : more) {
     header += fmt::format("property {} {}\n", property.type, property.name);

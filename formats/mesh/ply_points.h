@@ -33,9 +33,10 @@ struct PlyProperty {
 /// bytes, and then whatever else they have.
 class PlyPointWriter {
  public:
-  /// `count` points will come. Errors: those of OutputFile.
-  static Result<PlyPointWriter> create(const std::string& path, uint64_t count, bool doubles, bool force,
-                                       std::span<const PlyProperty> more = {});
+  /// `count` points will come, centres of voxels of `grid`, which a comment says (voxel_grid.h). Errors:
+  /// those of OutputFile.
+  static Result<PlyPointWriter> create(const std::string& path, const VolumeInfo& grid, uint64_t count,
+                                       bool doubles, bool force, std::span<const PlyProperty> more = {});
   /// `more`: the bytes of what each point has beside, one point after the other, as files have them.
   Status add(std::span<const ColoredPoint> points, std::span<const std::byte> more = {});
   /// Completes the file; without it, it never appears.

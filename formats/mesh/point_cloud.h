@@ -6,11 +6,13 @@
 #include <functional>
 #include <glm/vec3.hpp>
 #include <memory>
+#include <optional>
 #include <span>
 #include <string>
 #include <vector>
 
 #include "formats/result.h"
+#include "formats/volume.h"
 
 namespace voxkit {
 
@@ -22,12 +24,13 @@ struct CloudPoint {
   // What is wanted beside that, where the file has it:
   glm::vec3 normal{0};                     ///< of any length; 0: it has none
   uint8_t roughness = 255, metalness = 0;  ///< 0..255 for 0..1
+  std::array<uint8_t, 3> emission{};       ///< the part of its colour that is light of its own, in sRGB
   uint32_t label = 0;                      ///< a class, or another number
 };
 
 /// What points may have beside places and colours.
 struct PointExtras {
-  bool alpha = false, normals = false, rm = false, labels = false;
+  bool alpha = false, normals = false, rm = false, labels = false, emission = false;
 };
 
 class PointCloud {
@@ -40,6 +43,8 @@ class PointCloud {
 
   /// What the file has, wanted or not.
   const PointExtras& has() const { return has_; }
+  /// The grid whose voxels' centres these are, where the file says one (voxel_grid.h).
+  const std::optional<VolumeInfo>& grid() const { return grid_; }
 
   using Sink = std::function<Status(std::span<const CloudPoint>)>;
   /// Calls `sink` with the points, in runs, in their order: all but those with a coordinate that is not
@@ -50,6 +55,7 @@ class PointCloud {
  protected:
   uint64_t size_ = 0;
   PointExtras has_;
+  std::optional<VolumeInfo> grid_;
   std::vector<std::string> notes_;
 };
 
@@ -64,9 +70,10 @@ Result<std::unique_ptr<const PointCloud>> open_points(const std::string& path,
 
 /// The points of a .ply file: its vertices, which have x, y and z, and red, green and blue; without
 /// them intensity is grey, from 0, or the least where that is below, to the greatest; else they are white.
-/// Normals are nx, ny and nz; labels are label, class or classification, or a scalar_ of those, where
-/// what is below 0 counts back from 2^32. Null of a file with faces, which is a mesh. ErrorCode::input: no
-/// such file, or it is damaged as far as its header says.
+/// Normals are nx, ny and nz; emission is emissive_red, emissive_green and emissive_blue; labels are label,
+/// class or classification, or a scalar_ of those, where what is below 0 counts back from 2^32. A comment may
+/// say the grid that they are of (voxel_grid.h). Null of a file with faces, which is a mesh.
+/// ErrorCode::input: no such file, or it is damaged as far as its header says.
 Result<std::unique_ptr<const PointCloud>> open_ply_points(const std::string& path,
                                                           const PointExtras& wanted = {});
 

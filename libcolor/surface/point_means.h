@@ -21,6 +21,7 @@ struct AttributedPoint {
   uint8_t alpha = 255;
   std::array<int16_t, 3> normal{};  ///< of length 2^14, or 0
   uint8_t roughness = 255, metalness = 0;
+  Rgb emission;
   uint32_t label = 0;
 
   AttributedPoint() = default;
@@ -30,6 +31,7 @@ struct AttributedPoint {
         alpha(opacity ? from.alpha : uint8_t{255}),
         roughness(from.roughness),
         metalness(from.metalness),
+        emission{from.emission[0], from.emission[1], from.emission[2]},
         label(from.label) {
     const double x = from.normal.x, y = from.normal.y, z = from.normal.z;
     const double length = std::sqrt(x * x + y * y + z * z);
@@ -59,6 +61,9 @@ class PointMeans {
     for (size_t c = 0; c < 3; ++c) normal_[c] += static_cast<int64_t>(weight) * point.normal[c];
     rm_[0] += weight * point.roughness;
     rm_[1] += weight * point.metalness;
+    glow_[0] += weight * tables_.linear[point.emission.r];
+    glow_[1] += weight * tables_.linear[point.emission.g];
+    glow_[2] += weight * tables_.linear[point.emission.b];
     weight_ += weight;
     most_ = std::max(most_, point.alpha);
     ++count_;
@@ -80,6 +85,8 @@ class PointMeans {
     const auto stored = [&](uint64_t light) { return tables_.stored[mean(light)]; };
     voxels_.push_back({place_, {stored(light_[0]), stored(light_[1]), stored(light_[2])}});
     const auto byte = [&](uint64_t value) { bytes_.push_back(static_cast<std::byte>(value)); };
+    if (attributes_.has(Attribute::emissive))
+      for (const uint64_t light : glow_) byte(stored(light));
     if (attributes_.has(Attribute::opacity)) byte(most_ == 255 ? 255 : (2 * weight_ + count_) / (2 * count_));
     if (attributes_.has(Attribute::normal)) {
       const Octahedral o = octahedral_of(static_cast<double>(normal_[0]), static_cast<double>(normal_[1]),
@@ -92,7 +99,7 @@ class PointMeans {
       const uint32_t label = heaviest(labels_);
       for (int shift = 0; shift < 32; shift += 8) byte(label >> shift & 255);
     }
-    light_ = {}, rm_ = {}, normal_ = {}, weight_ = count_ = 0, most_ = 0;
+    light_ = {}, glow_ = {}, rm_ = {}, normal_ = {}, weight_ = count_ = 0, most_ = 0;
     labels_.clear();
     if (voxels_.size() < run_voxels) return {};
     VOX_CHECK(check_interrupt());
@@ -109,7 +116,7 @@ class PointMeans {
   std::vector<std::byte> bytes_;
   uint64_t place_ = 0, weight_ = 0, count_ = 0;
   uint8_t most_ = 0;
-  std::array<uint64_t, 3> light_{};
+  std::array<uint64_t, 3> light_{}, glow_{};
   std::array<uint64_t, 2> rm_{};
   std::array<int64_t, 3> normal_{};
   std::vector<std::pair<uint32_t, uint64_t>> labels_;  ///< and how many points have them, as they come

@@ -5,6 +5,7 @@
 #include <algorithm>
 #include <cmath>
 #include <cstring>
+#include <glm/matrix.hpp>
 #include <queue>
 #include <vector>
 
@@ -14,6 +15,7 @@
 #include "libcolor/surface/morton.h"
 #include "libcolor/surface/point_means.h"
 #include "libcolor/surface/voxel_means.h"
+#include "libcolor/surface/voxelise.h"
 
 namespace voxkit::color {
 namespace {
@@ -75,11 +77,29 @@ class PartFile {
   std::vector<uint64_t> sizes_;
 };
 
+/// Where points are in a grid.
+struct PointGrid {
+  glm::dvec3 corner{0};    ///< of the first voxel
+  glm::dmat3 turned{1.0};  ///< to the axes of voxels
+  double edge = 1;         ///< of a voxel, along these
+
+  static PointGrid of(const VolumeInfo& info) {
+    const Affine& affine = info.affine;
+    const Affine::Vector corner = affine.place({-0.5, -0.5, -0.5});
+    glm::dmat3 axes;
+    for (int i = 0; i < 3; ++i)
+      for (int c = 0; c < 3; ++c) axes[i][c] = affine.axes[static_cast<size_t>(i)][static_cast<size_t>(c)];
+    return {{corner[0], corner[1], corner[2]}, glm::inverse(axes)};
+  }
+  /// In voxels from the corner.
+  glm::dvec3 index_of(const glm::dvec3& at) const { return turned * (at - corner) / edge; }
+};
+
 class PointSurface final : public SurfaceSource {
  public:
-  PointSurface(std::unique_ptr<const PointCloud> points, VolumeInfo info, const glm::dvec3& lo,
+  PointSurface(std::unique_ptr<const PointCloud> points, VolumeInfo info, const PointGrid& grid,
                std::vector<std::string> notes, AttributeSet attributes)
-      : points_(std::move(points)), lo_(lo), edge_(info.affine.axes[0][0]) {
+      : points_(std::move(points)), grid_(grid) {
     info_ = std::move(info);
     notes_ = std::move(notes);
     attributes_ = attributes;
@@ -139,32 +159,51 @@ class PointSurface final : public SurfaceSource {
 
   uint64_t place_of(const CloudPoint& point) const {
     uint32_t at[3];
+    const glm::dvec3 index = grid_.index_of(point.at);
     for (int a = 0; a < 3; ++a)
-      at[a] = static_cast<uint32_t>(std::clamp<int64_t>(
-          static_cast<int64_t>(std::floor((point.at[a] - lo_[a]) / edge_)), 0, info_.dims[a] - 1));
+      at[a] = static_cast<uint32_t>(
+          std::clamp<int64_t>(static_cast<int64_t>(std::floor(index[a])), 0, info_.dims[a] - 1));
     return morton_code(at[0], at[1], at[2]);
   }
 
   std::unique_ptr<const PointCloud> points_;
-  glm::dvec3 lo_;
-  double edge_;  ///< of a voxel
+  PointGrid grid_;
 };
+
+/// Whether all points are in voxels of their own grid.
+Result<bool> are_inside(const PointCloud& points, const VolumeInfo& own) {
+  const PointGrid grid = PointGrid::of(own);
+  bool inside = true;
+  VOX_CHECK(points.read([&](std::span<const CloudPoint> run) -> Status {
+    for (const CloudPoint& point : run) {
+      const glm::dvec3 index = grid.index_of(point.at);
+      for (int a = 0; a < 3; ++a)  // written so that what is no number is outside
+        inside &= index[a] >= 0 && index[a] < static_cast<double>(own.dims[a]);
+    }
+    return {};
+  }));
+  return inside;
+}
 
 }  // namespace
 
 Result<std::unique_ptr<SurfaceSource>> surface_of_points(std::unique_ptr<const PointCloud> points,
-                                                         int64_t resolution, Context&,
+                                                         std::optional<int64_t> asked, Context&,
                                                          const std::optional<AttributeSet>& wanted) {
+  const int64_t resolution = asked.value_or(default_resolution);
   if (resolution < 1 || resolution > int64_t{1} << most_levels)
     return bad_usage(
         fmt::format("a resolution of {}: expected 1 to {}", resolution, int64_t{1} << most_levels));
   glm::dvec3 lo(INFINITY), hi(-INFINITY);
-  uint64_t seen = 0;
-  bool faint = false;
+  uint64_t seen = 0, bare = 0;
+  bool faint = false, shining = false;
   VOX_CHECK(points->read([&](std::span<const CloudPoint> run) -> Status {
     seen += run.size();
     for (const CloudPoint& point : run) {
       faint |= point.alpha != 255;
+      const float length = glm::length(point.normal);
+      bare += length > 0 && std::isfinite(length) ? 0 : 1;
+      shining |= point.emission != std::array<uint8_t, 3>{};
       for (int a = 0; a < 3; ++a) {
         lo[a] = std::min(lo[a], point.at[a]);
         hi[a] = std::max(hi[a], point.at[a]);
@@ -175,10 +214,12 @@ Result<std::unique_ptr<SurfaceSource>> surface_of_points(std::unique_ptr<const P
   if (seen == 0) return bad_input({}, "no points that are at finite coordinates and at least half opaque");
   const PointExtras& has = points->has();
   AttributeSet can, by_itself;
+  add_if(can, Attribute::emissive, has.emission);
   add_if(can, Attribute::opacity, has.alpha);
   add_if(can, Attribute::normal, has.normals);
   add_if(can, Attribute::rm, has.rm);
   add_if(can, Attribute::id, has.labels);
+  add_if(by_itself, Attribute::emissive, shining);
   add_if(by_itself, Attribute::opacity, has.alpha && faint);
   VOX_TRY(const AttributeSet attributes, choose_attributes(wanted, can, by_itself));
   std::vector<std::string> notes = points->notes();
@@ -187,6 +228,22 @@ Result<std::unique_ptr<SurfaceSource>> surface_of_points(std::unique_ptr<const P
         fmt::format("{} of {} points are dropped: they are at coordinates that are not finite, or less "
                     "than half opaque",
                     points->size() - seen, points->size()));
+  if (attributes.has(Attribute::normal) && bare > 0)
+    notes.push_back(fmt::format(
+        "{} of {} points have a normal of 0, or none of numbers: a voxel of such points alone has 0, 0, 1",
+        bare, seen));
+  if (const auto& own = points->grid()) {
+    const std::string sides = fmt::format("{} x {} x {}", own->dims.x, own->dims.y, own->dims.z);
+    VOX_TRY(const bool inside, are_inside(*points, *own));
+    if (!inside)
+      notes.push_back(fmt::format("their grid of {} voxels is not around all of them: dropped", sides));
+    if (inside && (!asked || *asked == std::max({own->dims.x, own->dims.y, own->dims.z}))) {
+      notes.push_back(fmt::format("points of voxels: their own grid of {} is taken", sides));
+      const VolumeInfo info = *own;
+      return std::make_unique<PointSurface>(std::move(points), info, PointGrid::of(info), std::move(notes),
+                                            attributes);
+    }
+  }
   const double longest = std::max({hi.x - lo.x, hi.y - lo.y, hi.z - lo.z});
   const double edge = longest > 0 ? longest / static_cast<double>(resolution) : 1;
   VolumeInfo info;
@@ -197,7 +254,9 @@ Result<std::unique_ptr<SurfaceSource>> surface_of_points(std::unique_ptr<const P
     info.affine.axes[axis][axis] = edge;
     info.affine.origin[axis] = lo[a] + edge / 2;
   }
-  return std::make_unique<PointSurface>(std::move(points), std::move(info), lo, std::move(notes), attributes);
+  const PointGrid grid{.corner = lo, .edge = edge};
+  return std::make_unique<PointSurface>(std::move(points), std::move(info), grid, std::move(notes),
+                                        attributes);
 }
 
 }  // namespace voxkit::color

@@ -105,7 +105,11 @@ TEST_F(PlyPointsTest, DoublesWhereFloatsDoNotDo) {
   EXPECT_TRUE(needs_doubles(-5.4e6, 0, 0.25));
   EXPECT_TRUE(needs_doubles(0, 1e39, 1e36));
   for (const bool doubles : {false, true}) {
-    auto writer = PlyPointWriter::create(path("b.ply"), 2, doubles, true);
+    VolumeInfo grid;
+    grid.dims = {500001, 1, 2};
+    grid.affine.axes[2] = {0.25, 0, 0.5};
+    grid.world = World::ras;
+    auto writer = PlyPointWriter::create(path("b.ply"), grid, 2, doubles, true);
     ASSERT_TRUE(writer);
     const ColoredPoint points[] = {{{500000.015625, 0.1, -1}, {1, 2, 3}}, {{0, 0, 0}, {4, 5, 6}}};
     ASSERT_TRUE(writer->add(points));
@@ -115,6 +119,22 @@ TEST_F(PlyPointsTest, DoublesWhereFloatsDoNotDo) {
     EXPECT_EQ(back[0].at.x, doubles ? 500000.015625 : static_cast<double>(500000.015625f));
     EXPECT_EQ(back[0].at.y, doubles ? 0.1 : static_cast<double>(0.1f));
     EXPECT_EQ(back[1].color, (std::array<uint8_t, 3>{4, 5, 6}));
+    const auto cloud = open_ply_points(path("b.ply"));
+    ASSERT_TRUE(cloud);
+    ASSERT_TRUE((*cloud)->grid());
+    EXPECT_EQ((*cloud)->grid()->dims, grid.dims);
+    EXPECT_EQ((*cloud)->grid()->affine, grid.affine);
+    EXPECT_EQ((*cloud)->grid()->world, World::ras);
+  }
+}
+
+TEST_F(PlyPointsTest, CommentsThatAreNoGridAreComments) {
+  for (const char* const comment : {"voxel_grid", "voxel_grid {}", "voxel_grid [", "grid"}) {
+    const auto cloud =
+        open_ply_points(put("c.ply", "ply\nformat ascii 1.0\ncomment " + std::string(comment) +
+                                         "\nelement vertex 1\n" + three + "end_header\n1 2 3\n"));
+    ASSERT_TRUE(cloud) << comment;
+    EXPECT_FALSE((*cloud)->grid()) << comment;
   }
 }
 

@@ -6,6 +6,7 @@
 #include <random>
 
 #include "libcolor/surface/linear_light.h"
+#include "libcolor/surface/morton.h"
 #include "libcolor/surface/octahedral.h"
 #include "libcolor/surface/point_surface.h"
 #include "libcolor/surface/volume_surface.h"
@@ -18,9 +19,12 @@ namespace {
 
 class ListCloud final : public PointCloud {
  public:
-  ListCloud(std::vector<CloudPoint> points, const PointExtras& has) : points_(std::move(points)) {
+  ListCloud(std::vector<CloudPoint> points, const PointExtras& has,
+            const std::optional<VolumeInfo>& grid = {})
+      : points_(std::move(points)) {
     size_ = points_.size();
     has_ = has;
+    grid_ = grid;
   }
   Status read(const Sink& sink) const override { return sink(points_); }
 
@@ -95,6 +99,72 @@ TEST_F(PointAttributes, MeansOfPoints) {
   // By itself: opacity only where some point is faint.
   EXPECT_EQ(points(list, 4, std::nullopt).attributes, set_of({Attribute::opacity}));
   EXPECT_EQ(points({list[3]}, 4, std::nullopt).attributes, AttributeSet());
+}
+
+TEST_F(PointAttributes, LightOfPointsIsMeantAsTheirColors) {
+  std::vector<CloudPoint> list = {point({0, 0, 0}, 100, 255, {}, 0), point({0.1, 0, 0}, 200, 255, {}, 0),
+                                  point({8, 0, 0}, 9, 255, {}, 0)};
+  list[0].emission = {100, 0, 7};
+  list[1].emission = {200, 0, 7};
+  const PointExtras has{.emission = true};
+  const Read out = points(list, 4, std::nullopt, has);
+  EXPECT_EQ(out.attributes, set_of({Attribute::emissive}));
+  ASSERT_EQ(out.voxels.size(), 2u);
+  EXPECT_EQ(out.of(0), (std::vector<int>{out.voxels[0].color.r, 0, 7}));
+  EXPECT_EQ(out.of(1), (std::vector<int>{0, 0, 0}));
+  EXPECT_EQ(points({list[2]}, 4, std::nullopt, has).attributes, AttributeSet());
+}
+
+TEST_F(PointAttributes, NormalsThatAreNoneAreCounted) {
+  std::vector<CloudPoint> list = {point({0, 0, 0}, 1, 255, {0, 1, 0}, 0), point({1, 0, 0}, 1, 255, {}, 0),
+                                  point({2, 0, 0}, 1, 255, {NAN, 0, 1}, 0)};
+  const Read out = points(list, 4, set_of({Attribute::normal}));
+  ASSERT_EQ(out.notes.size(), 1u);
+  EXPECT_EQ(out.notes[0],
+            "2 of 3 points have a normal of 0, or none of numbers: a voxel of such points alone has 0, 0, 1");
+  EXPECT_TRUE(points(list, 4, AttributeSet()).notes.empty());
+}
+
+TEST_F(PointAttributes, PointsInTheirOwnGrid) {
+  VolumeInfo grid;
+  grid.dims = {20, 7, 3};
+  grid.affine.axes = {{{0, 0.25, 0}, {-0.5, 0, 0.125}, {0, 0, 3}}};  // turned, and sheared
+  grid.affine.origin = {1000, -3, 0.5};
+  grid.world = World::ras;
+  std::vector<CloudPoint> list;
+  std::map<uint64_t, uint8_t> want;
+  for (int64_t z = 0; z < 3; ++z)
+    for (int64_t y = z; y < 7; y += 2)
+      for (int64_t x = 3; x < 17; x += 3) {
+        const auto p =
+            grid.affine.place({static_cast<double>(x), static_cast<double>(y), static_cast<double>(z)});
+        const auto gray = static_cast<uint8_t>(10 * x + y);
+        list.push_back(point({p[0], p[1], p[2]}, gray, 255, {}, 0));
+        want[morton_code(static_cast<uint32_t>(x), static_cast<uint32_t>(y), static_cast<uint32_t>(z))] =
+            gray;
+      }
+  const auto surface_in = [&](std::optional<int64_t> resolution) {
+    return surface_of_points(std::make_unique<const ListCloud>(list, PointExtras{}, grid), resolution, ctx_);
+  };
+  for (const std::optional<int64_t> resolution : {std::optional<int64_t>(), std::optional<int64_t>(20)}) {
+    auto surface = surface_in(resolution);
+    ASSERT_TRUE(surface);
+    EXPECT_EQ((*surface)->info().dims, grid.dims);
+    EXPECT_EQ((*surface)->info().affine, grid.affine);
+    EXPECT_EQ((*surface)->info().world, World::ras);
+    const Read out = read(std::move(surface), ctx_);
+    ASSERT_EQ(out.voxels.size(), want.size());
+    for (const SurfaceVoxel& voxel : out.voxels) EXPECT_EQ(want.at(voxel.place), voxel.color.r);
+    EXPECT_EQ(out.notes, std::vector<std::string>{"points of voxels: their own grid of 20 x 7 x 3 is taken"});
+  }
+  EXPECT_EQ((*surface_in(10))->info().affine.axes[0][1], 0);
+  // Where one is outside: a grid around them.
+  list.push_back(point({0, 0, 0}, 1, 255, {}, 0));
+  const auto around = surface_in(std::nullopt);
+  ASSERT_TRUE(around);
+  EXPECT_EQ((*around)->info().dims.x, 1024);
+  EXPECT_EQ((*around)->notes(),
+            std::vector<std::string>{"their grid of 20 x 7 x 3 voxels is not around all of them: dropped"});
 }
 
 TEST_F(PointAttributes, PartsDoNotMatter) {

@@ -38,6 +38,8 @@ bool is_wanted(const SurfaceOptions& options, color::Attribute attribute) {
 PointExtras point_extras(const SurfaceOptions& options) {
   PointExtras extras;
   extras.alpha = !options.attributes || is_wanted(options, color::Attribute::opacity);
+  extras.emission =
+      options.emission && (!options.attributes || is_wanted(options, color::Attribute::emissive));
   extras.normals = is_wanted(options, color::Attribute::normal);
   extras.rm = is_wanted(options, color::Attribute::rm);
   extras.labels = is_wanted(options, color::Attribute::id);
@@ -55,8 +57,7 @@ Surface voxelise(const std::string& name, const SurfaceOptions& options, Context
   if (is_points_name(name)) {
     VOX_TRY(auto points, open_points(name, point_extras(options)));
     if (points)
-      return color::surface_of_points(
-          std::move(points), options.resolution.value_or(color::default_resolution), ctx, options.attributes);
+      return color::surface_of_points(std::move(points), options.resolution, ctx, options.attributes);
   }
   VOX_TRY(Mesh mesh, read_mesh(name, ctx, mesh_options(options)));
   return color::make_surface(std::move(mesh), voxelise_options(options), ctx);
@@ -73,8 +74,7 @@ Result<T> named(Result<T> made, const std::string& name) {
 Surface joined(std::vector<PlacedPoints> clouds, std::vector<Mesh> meshes, const SurfaceOptions& options,
                Context& ctx) {
   if (meshes.empty())
-    return color::surface_of_points(join_points(std::move(clouds)),
-                                    options.resolution.value_or(color::default_resolution), ctx,
+    return color::surface_of_points(join_points(std::move(clouds)), options.resolution, ctx,
                                     options.attributes);
   for (PlacedPoints& cloud : clouds) {
     VOX_TRY(Mesh mesh, mesh_of_points(*cloud.points, ctx));
@@ -174,7 +174,8 @@ Surface open_surfaces(std::span<const PlacedInput> inputs, const SurfaceOptions&
   if (!meshes_of
            .empty())  // points of meshes have places, colours and opacities: the rest is named as dropped
     for (size_t i = 0; i < clouds.size(); ++i) {
-      for (const color::Attribute a : {color::Attribute::normal, color::Attribute::rm, color::Attribute::id})
+      for (const color::Attribute a :
+           {color::Attribute::emissive, color::Attribute::normal, color::Attribute::rm, color::Attribute::id})
         if (is_wanted(options, a))
           return fail(
               ErrorCode::usage, clouds_of[i]->name,

@@ -17,7 +17,7 @@ struct SurfaceOptions {
   OpenOptions open;
   std::optional<int64_t> resolution;  ///< of meshes and .dagc files: voxels along the longest side
   color::SurfaceKind kind = color::SurfaceKind::thin;
-  bool emission = true;           ///< of meshes: is added to the colours
+  bool emission = true;           ///< of meshes: is added to the colours; of points: is read
   std::optional<uint32_t> frame;  ///< of an animated .vox model
   /// What voxels have beside colours; nothing: emissive and opacity where the input has them.
   std::optional<color::AttributeSet> attributes = color::AttributeSet();

@@ -105,7 +105,7 @@ Status write_points(const Part& part, uint64_t count, const std::string& name, b
   const VolumeInfo& info = part.info();
   const bool doubles = needs_doubles(info);
   const Properties properties(part.attributes());
-  VOX_TRY(auto writer, PlyPointWriter::create(name, count, doubles, force, properties.list()));
+  VOX_TRY(auto writer, PlyPointWriter::create(name, info, count, doubles, force, properties.list()));
   std::vector<ColoredPoint> points;
   std::vector<std::byte> more;
   VOX_CHECK(part.each(
