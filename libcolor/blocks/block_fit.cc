@@ -125,8 +125,11 @@ Rgb Fitter::quantised(const std::array<float, 3>& color) const {
   return {from_5_bits(to(color[0], 31)), from_6_bits(to(color[1], 63)), from_5_bits(to(color[2], 31))};
 }
 
-Fit Fitter::fit(uint32_t first, uint32_t last, int bits) const {
-  return bits == 0 ? fit_single(first, last) : fit_line(first, last, bits);
+void Fitter::fit(uint32_t first, uint32_t last, int bits, Fit& out) const {
+  if (bits == 0)
+    fit_single(first, last, out);
+  else
+    out = fit_line(first, last, bits);
 }
 
 Distances Fitter::lab_distances(const Fit& fit, uint32_t first, uint32_t last, uint32_t most,
@@ -140,14 +143,15 @@ Distances Fitter::lab_distances(const Fit& fit, uint32_t first, uint32_t last, u
   return kernels_.nearest(run, steps.data(), static_cast<int>(count), allowed_, weights);
 }
 
-Fit Fitter::fit_single(uint32_t first, uint32_t last) const {
+void Fitter::fit_single(uint32_t first, uint32_t last, Fit& fit) const {
   const uint32_t count = last - first;
-  Fit fit;
   if (count == 1) {
     fit.feasible = true;
     fit.a = fit.b = colors_.color(first);
-    return fit;
+    fit.squared_error = 0;
+    return;
   }
+  fit.feasible = false;
   const MacroColors::Sums s = colors_.sums(first, last);
   const auto mean = [&](size_t c) { return static_cast<uint8_t>((2 * s[c] + count) / (2 * count)); };
   fit.a = fit.b = {mean(0), mean(1), mean(2)};
@@ -155,7 +159,7 @@ Fit Fitter::fit_single(uint32_t first, uint32_t last) const {
     const Distances d = lab_distances(fit, first, last, 1, nullptr);
     fit.squared_error = d.sum;
     fit.feasible = d.most <= allowed_;
-    return fit;
+    return;
   }
   // Of all single colours the mean has the least error, but for its rounding.
   const uint64_t squares = uint64_t{s[3]} + s[4] + s[5];
@@ -163,11 +167,10 @@ Fit Fitter::fit_single(uint32_t first, uint32_t last) const {
     return uint64_t{v} * (2 * uint64_t{s[c]} - uint64_t{v} * count);
   };
   fit.squared_error = squares - cross(0, fit.a.r) - cross(1, fit.a.g) - cross(2, fit.a.b);
-  if (fit.squared_error > uint64_t{allowed_} * count) return fit;
+  if (fit.squared_error > uint64_t{allowed_} * count) return;
   // No square is greater than the sum of them all.
   fit.feasible =
       fit.squared_error <= allowed_ || kernels_.within(run_of(colors_, first, last), floats(fit.a), allowed_);
-  return fit;
 }
 
 Fit Fitter::fit_line(uint32_t first, uint32_t last, int bits) const {

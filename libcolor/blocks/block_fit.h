@@ -58,13 +58,19 @@ class Fitter {
   /// `effort`, 1 to 9: how many pairs of ends are tried.
   Fitter(const MacroColors& colors, Endpoints endpoints, uint32_t allowed, int effort);
   /// The colours first .. last, half open, with `bits` bits a weight, 0 to 4.
-  Fit fit(uint32_t first, uint32_t last, int bits) const;
+  Fit fit(uint32_t first, uint32_t last, int bits) const {
+    Fit found;
+    fit(first, last, bits, found);
+    return found;
+  }
+  /// The same into `out`, which saves passing on the fits of millions of small runs.
+  void fit(uint32_t first, uint32_t last, int bits, Fit& out) const;
   /// The greatest squared distance of a fit; in CIELAB times lab_scale^2. `out`: the weights, in order, with
   /// room for color_vector more.
   uint32_t weights(const Fit& fit, uint32_t first, uint32_t last, int bits, uint8_t* out) const;
 
  private:
-  Fit fit_single(uint32_t first, uint32_t last) const;
+  void fit_single(uint32_t first, uint32_t last, Fit& fit) const;
   Fit fit_line(uint32_t first, uint32_t last, int bits) const;
   Fit fit_lab_line(uint32_t first, uint32_t last, int bits, const LineTries& line) const;
   /// How far decoded colours are from what they were; `weights`: if not null, those that they get.

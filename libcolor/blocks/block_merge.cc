@@ -33,7 +33,7 @@ class List {
   const Fit& joined(uint32_t i) {
     MergeItem& item = items_[i];
     if (!item.tried) {
-      item.joined = fitter_.fit(item.first, items_[item.right].last, bits_);
+      fitter_.fit(item.first, items_[item.right].last, bits_, item.joined);
       item.tried = true;
     }
     return item.joined;
