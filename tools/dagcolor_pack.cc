@@ -12,6 +12,7 @@
 #include "libcolor/part_codecs.h"
 #include "libcolor/simplify/simplified_surface.h"
 #include "tools/common/attributes.h"
+#include "tools/common/batch.h"
 #include "tools/common/color_report.h"
 #include "tools/common/encoding.h"
 #include "tools/common/surface_input.h"
@@ -21,9 +22,11 @@ namespace voxkit::cli {
 namespace {
 
 struct Options {
-  std::vector<std::string> names;
+  Batch batch;
+  std::vector<std::string> names;       ///< of one surface
   std::map<size_t, glm::dvec3> places;  ///< of inputs that are moved
-  std::string output, tiles;
+  std::string output;                   ///< its file
+  std::string tiles;
   SurfaceOptions surface;
   std::string kind = "thin", codec, image_curve, curve = "morton", colors = "leaf", counts = "node", space,
               emissive = "add", geometry = "auto", purpose = "access";
@@ -42,7 +45,7 @@ void declare(CommandLine& line, Options& o) {
       "volume, built-in "
       "(menger:5, terrain:N, terrain:N:box), or .dagc file. Several meshes or points become one surface: "
       "what shares a voxel has their mean, as in one file",
-      o.names);
+      o.batch.inputs);
   line.behind_arguments(
       "--at", "X,Y,Z",
       "Of the mesh or points named before it: moved by so much, in the unit of the file (0,0,0)",
@@ -51,7 +54,11 @@ void declare(CommandLine& line, Options& o) {
         o.places[number] = {at[0], at[1], at[2]};
         return {};
       });
-  line.file("-o,--output", "OUT", "Output (.dagc), or -", o.output, true);
+  line.file("-o,--output", "OUT",
+            "Output (.dagc), or -; a surface for each input: a folder that exists or ends with /, or a name "
+            "with {stem}",
+            o.batch.output, true);
+  declare_batch(line, o.batch);
   line.option(
       "--resolution", "N",
       "Of a mesh or points: voxels along the longest side (1024; of what vox-decode wrote, its own grid). "
@@ -346,7 +353,7 @@ Result<int> work(const Options& o, Run& run) {
   const std::vector<std::string> unused = unused_options(o, report);
   for (const std::string& note : unused) run.say(note);
   notes.insert(notes.end(), unused.begin(), unused.end());
-  if (run.options.json) VOX_CHECK(print(json_of(encoding, run, report, o, notes, diff).text()));
+  if (run.options.json) VOX_CHECK(run.print_result(json_of(encoding, run, report, o, notes, diff)));
   if (!run.options.quiet && !run.options.json)
     tell(fmt::format(
         "{}: {} voxels in {} bytes: geometry {}, colors {} ({:.4g} %){}{}{}, error {:.4g}, in {:.2f} s{}",
@@ -356,6 +363,22 @@ Result<int> work(const Options& o, Run& run) {
         emits ? ", emission added" : "", p.grmse, encoding.seconds,
         diff ? fmt::format(", greatest error {:.4g}", diff->max_distance) : ""));
   return 0;
+}
+
+/// All inputs as one surface, or each as its own.
+Result<int> work_on_all(const Options& o, Run& run) {
+  Options options = o;
+  if (!names_many(o.batch) && !o.batch.recursive) {
+    options.names = o.batch.inputs;
+    options.output = o.batch.output;
+    return is_done(o.batch, options.output, run) ? Result<int>(0) : work(options, run);
+  }
+  if (!o.places.empty()) return bad_usage("--at: of inputs that become one surface: expected one output");
+  return run_batch(o.batch, {".dagc", is_surface_file}, run, [&](const Job& job, Run& own) {
+    options.names = {job.input};
+    options.output = job.output;
+    return work(options, own);
+  });
 }
 
 }  // namespace
@@ -376,5 +399,6 @@ int main(int argc, char** argv) {
       "  dagcolor-pack house.dagc -o coarse.dagc --resolution 512\n"
       "  dagcolor-pack scan.ply -o scan.dagc --attributes color,normal,id\n"
       "  dagcolor-pack house.dagc --tiles tile-%04d.dds -o other.dagc --codec bc7\n",
-      [&](CommandLine& line) { declare(line, options); }, [&](Run& run) { return work(options, run); });
+      [&](CommandLine& line) { declare(line, options); },
+      [&](Run& run) { return work_on_all(options, run); });
 }

@@ -10,6 +10,7 @@
 #include "formats/spool.h"
 #include "libsvmm/packed/packed.h"
 #include "libsvmm/svmm.h"
+#include "tools/common/batch.h"
 #include "tools/common/encoding.h"
 #include "tools/common/retype.h"
 #include "tools/common/svmm_report.h"
@@ -18,7 +19,8 @@ namespace voxkit::cli {
 namespace {
 
 struct Options {
-  std::string input, output;
+  Batch batch;
+  std::string input, output;  ///< of one encoding
   OpenOptions open;
   std::optional<double> quality, delta;
   std::string layout;
@@ -44,9 +46,13 @@ struct Options {
 };
 
 void declare(CommandLine& line, Options& o) {
-  line.argument("INPUT", "Volume file, folder or pattern of images, built-in such as menger:5, or -",
-                o.input);
-  line.file("-o,--output", "OUT", "Output (.svmm), or -", o.output, true);
+  line.arguments("INPUT", "Volume file, folder or pattern of images, built-in such as menger:5, or -",
+                 o.batch.inputs);
+  line.file(
+      "-o,--output", "OUT",
+      "Output (.svmm), or -; of several inputs a folder that exists or ends with /, or a name with {stem}",
+      o.batch.output, true);
+  declare_batch(line, o.batch);
   line.option("-w,--blockwidth", "W[,W...]",
               "Block widths, powers of two, base level first, the last for all levels above; 0: stepped 2, "
               "4, 8 ... (0)",
@@ -244,7 +250,7 @@ Result<int> work_packed(const Options& o, Inputs& inputs, Run& run) {
     add_verified(encoding, json);
   }
   VOX_CHECK(out->commit());
-  if (run.options.json) VOX_CHECK(print(json.text()));
+  if (run.options.json) VOX_CHECK(run.print_result(json));
   if (!run.options.quiet && !run.options.json) print_encoding(encoding);
   return 0;
 }
@@ -288,9 +294,18 @@ Result<int> work(const Options& o, Run& run) {
     if (!held) return 1;
   }
   VOX_CHECK(out->commit());
-  if (run.options.json) VOX_CHECK(print(json_of(encoding, run, params, levels).text()));
+  if (run.options.json) VOX_CHECK(run.print_result(json_of(encoding, run, params, levels)));
   if (!run.options.quiet && !run.options.json) print_encoding(encoding);
   return 0;
+}
+
+Result<int> work_on_all(const Options& o, Run& run) {
+  return run_batch(o.batch, {".svmm", is_volume_file}, run, [&](const Job& job, Run& own) {
+    Options options = o;
+    options.input = job.input;
+    options.output = job.output;
+    return work(options, own);
+  });
 }
 
 }  // namespace
@@ -306,5 +321,6 @@ int main(int argc, char** argv) {
       "  svmm-encode head.nii.gz -o head.svmm --target-psnr 45\n"
       "  svmm-encode menger:6 -o menger.svmm --blockwidth 4 --base bitmap --quality 80\n"
       "  svmm-encode scan.raw --dims 512,512,361 --type u16 -o - --max-error 2 > scan.svmm\n",
-      [&](CommandLine& line) { declare(line, options); }, [&](Run& run) { return work(options, run); });
+      [&](CommandLine& line) { declare(line, options); },
+      [&](Run& run) { return work_on_all(options, run); });
 }

@@ -9,6 +9,7 @@
 #include "formats/output_file.h"
 #include "libvq/error_step.h"
 #include "libvq/vq.h"
+#include "tools/common/batch.h"
 #include "tools/common/encoding.h"
 #include "tools/common/vq_report.h"
 
@@ -16,7 +17,8 @@ namespace voxkit::cli {
 namespace {
 
 struct Options {
-  std::string input, output;
+  Batch batch;
+  std::string input, output;  ///< of one encoding
   OpenOptions open;
   bool lossless = false;
   std::string codebook = "rbuc", offsets = "auto";
@@ -29,9 +31,13 @@ struct Options {
 };
 
 void declare(CommandLine& line, Options& o) {
-  line.argument("INPUT", "Volume file, folder or pattern of images, built-in such as sphere:64, or -",
-                o.input);
-  line.file("-o,--output", "OUT", "Output (.vqv), or -", o.output, true);
+  line.arguments("INPUT", "Volume file, folder or pattern of images, built-in such as sphere:64, or -",
+                 o.batch.inputs);
+  line.file(
+      "-o,--output", "OUT",
+      "Output (.vqv), or -; of several inputs a folder that exists or ends with /, or a name with {stem}",
+      o.batch.output, true);
+  declare_batch(line, o.batch);
   line.flag("--lossless", "Every voxel as it is; floats are refused (default, but floats get 65536 levels)",
             o.lossless);
   line.option("--max-error", "E", "No voxel is further than this from the original, in sample values",
@@ -170,7 +176,7 @@ Result<int> work(const Options& o, Run& run) {
     }
   }
   VOX_CHECK(out->commit());
-  if (run.options.json) VOX_CHECK(print(json_of(encoding, run, report).text()));
+  if (run.options.json) VOX_CHECK(run.print_result(json_of(encoding, run, report)));
   if (!run.options.quiet && !run.options.json) print_encoding(encoding);
   if (!run.options.quiet && report.replaced)
     tell(fmt::format("{}: {}: {}", run.tool, o.input,
@@ -178,6 +184,15 @@ Result<int> work(const Options& o, Run& run) {
                          ? "voxels that are infinite became the least or the greatest value"
                          : "voxels that are NaN or infinite became the least or the greatest value"));
   return 0;
+}
+
+Result<int> work_on_all(const Options& o, Run& run) {
+  return run_batch(o.batch, {".vqv", is_volume_file}, run, [&](const Job& job, Run& own) {
+    Options options = o;
+    options.input = job.input;
+    options.output = job.output;
+    return work(options, own);
+  });
 }
 
 }  // namespace
@@ -193,5 +208,6 @@ int main(int argc, char** argv) {
       "  vq-encode head.nii.gz -o head.vqv --reduce 16 --verify\n"
       "  vq-encode head.nii.gz -o head.vqv --codewords 4096 --codebook packed\n"
       "  vq-encode scan.raw --dims 512,512,361 --type u16 -o - > scan.vqv\n",
-      [&](CommandLine& line) { declare(line, options); }, [&](Run& run) { return work(options, run); });
+      [&](CommandLine& line) { declare(line, options); },
+      [&](Run& run) { return work_on_all(options, run); });
 }

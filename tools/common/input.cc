@@ -2,6 +2,7 @@
 
 #include <fmt/core.h>
 
+#include <algorithm>
 #include <array>
 #include <cmath>
 #include <filesystem>
@@ -14,6 +15,7 @@
 #include "formats/input_stream.h"
 #include "formats/mapped_file.h"
 #include "formats/volume/readers.h"
+#include "formats/volume/volume_formats.h"
 #include "libcolor/edit/levels.h"
 #include "libcolor/terrain/terrain.h"
 
@@ -133,6 +135,16 @@ void declare_input_options(CommandLine& line, OpenOptions& options, bool type) {
             "textures of "
             "a mesh",
             options.allow_outside);
+}
+
+bool is_volume_file(const std::string& name) {
+  const VolumeFormat* const format = find_volume_format(name);
+  if (format == nullptr) return false;
+  const auto any = [&](std::initializer_list<std::string_view> endings) {
+    return std::any_of(endings.begin(), endings.end(),
+                       [&](const std::string_view ending) { return has_ending(name, ending); });
+  };
+  return format->images ? any({".tif", ".tiff"}) : !any({".raw", ".img", ".img.gz", ".dcm"});
 }
 
 bool is_compressed(const std::string& name) {

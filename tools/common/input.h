@@ -37,6 +37,9 @@ Result<Input> open_compressed(const std::string& name, std::optional<int> level,
 /// The container in a file or on standard input.
 Result<std::shared_ptr<const Container>> open_container(const std::string& name, Context& ctx);
 
+/// Whether a file is a volume by its ending: not one of several slices, nor raw samples, nor the second file
+/// of a pair.
+bool is_volume_file(const std::string& name);
 /// True for names that end like a compressed volume.
 bool is_compressed(const std::string& name);
 /// Bytes of the file, or of all files of a folder; nothing for built-ins, patterns and streams.

@@ -89,6 +89,10 @@ std::string Json::text() const {
   return value_->json.dump(2, ' ', false, Ordered::error_handler_t::replace) + "\n";
 }
 
+std::string Json::line() const {
+  return value_->json.dump(-1, ' ', false, Ordered::error_handler_t::replace) + "\n";
+}
+
 std::string readable(double value) {
   if (std::isinf(value)) return value > 0 ? "inf" : "-inf";
   return fmt::format("{:.6g}", value);

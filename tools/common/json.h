@@ -48,6 +48,8 @@ class Json {
 
   /// Text of the whole, with a line feed at its end.
   std::string text() const;
+  /// The same in one line.
+  std::string line() const;
 
  private:
   struct Value;

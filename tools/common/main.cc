@@ -13,6 +13,7 @@
 #include <system_error>
 
 #include "formats/output_file.h"
+#include "tools/common/json.h"
 
 namespace voxkit::cli {
 namespace {
@@ -45,26 +46,6 @@ void handle_signals() {
   std::signal(SIGXFSZ, SIG_IGN);
 }
 
-int exit_code(const Error& error) {
-  switch (error.code) {
-    case ErrorCode::usage:
-      return 2;
-    case ErrorCode::input:
-      return 3;
-    case ErrorCode::output:
-      return 4;
-    case ErrorCode::limit:
-      return 5;
-    case ErrorCode::device:
-      return 6;
-    case ErrorCode::interrupted:
-      return 128 + interrupt_signal;
-    case ErrorCode::internal:
-      break;
-  }
-  return 70;
-}
-
 }  // namespace
 
 void Run::stage(const std::string& name) {
@@ -89,39 +70,66 @@ void Run::note(const std::string& line) const {
   if (options.verbose) tell(fmt::format("{}: {}", tool, line));
 }
 
+Status Run::print_result(const Json& json) const {
+  return print(json_lines ? json.line() : json.text());
+}
+
 double Run::seconds() const {
   return seconds_since(start_);
+}
+
+Result<int> guarded(const std::function<Result<int>()>& work) {
+  try {
+    return work();
+  } catch (const std::bad_alloc&) {
+    return fail(ErrorCode::limit, {}, "out of memory: use --max-memory or fewer --threads");
+  } catch (const std::system_error& e) {
+    // Of threads that cannot be had; of memory for them, as a rule.
+    const bool resources = e.code() == std::errc::resource_unavailable_try_again;
+    return resources ? fail(ErrorCode::limit, {}, "no memory for threads: use fewer --threads")
+                     : fail(ErrorCode::internal, {}, fmt::format("a bug of ours: {}", e.what()));
+  } catch (const std::exception& e) {
+    return fail(ErrorCode::internal, {}, fmt::format("a bug of ours: {}", e.what()));
+  } catch (...) {
+    return fail(ErrorCode::internal, {}, "a bug of ours: an unknown exception");
+  }
+}
+
+int exit_code(const Error& error) {
+  switch (error.code) {
+    case ErrorCode::usage:
+      return 2;
+    case ErrorCode::input:
+      return 3;
+    case ErrorCode::output:
+      return 4;
+    case ErrorCode::limit:
+      return 5;
+    case ErrorCode::device:
+      return 6;
+    case ErrorCode::interrupted:
+      return 128 + interrupt_signal;
+    case ErrorCode::internal:
+      break;
+  }
+  return 70;
 }
 
 int run_tool(int argc, char** argv, const std::string& tool, const std::string& purpose,
              const std::string& examples, const std::function<void(CommandLine&)>& declare,
              const std::function<Result<int>(Run&)>& work) {
   handle_signals();
-  Result<int> result = 0;
-  try {
-    result = [&]() -> Result<int> {
-      CommandLine line(tool, purpose, examples);
-      declare(line);
-      VOX_TRY(const auto outcome, line.parse(argc, argv));
-      if (outcome.print) {
-        VOX_CHECK(print(*outcome.print));
-        return 0;
-      }
-      Run run(tool, outcome.options);
-      return work(run);
-    }();
-  } catch (const std::bad_alloc&) {
-    result = fail(ErrorCode::limit, {}, "out of memory: use --max-memory or fewer --threads");
-  } catch (const std::system_error& e) {
-    // Of threads that cannot be had; of memory for them, as a rule.
-    const bool resources = e.code() == std::errc::resource_unavailable_try_again;
-    result = resources ? fail(ErrorCode::limit, {}, "no memory for threads: use fewer --threads")
-                       : fail(ErrorCode::internal, {}, fmt::format("a bug of ours: {}", e.what()));
-  } catch (const std::exception& e) {
-    result = fail(ErrorCode::internal, {}, fmt::format("a bug of ours: {}", e.what()));
-  } catch (...) {
-    result = fail(ErrorCode::internal, {}, "a bug of ours: an unknown exception");
-  }
+  const Result<int> result = guarded([&]() -> Result<int> {
+    CommandLine line(tool, purpose, examples);
+    declare(line);
+    VOX_TRY(const auto outcome, line.parse(argc, argv));
+    if (outcome.print) {
+      VOX_CHECK(print(*outcome.print));
+      return 0;
+    }
+    Run run(tool, outcome.options);
+    return work(run);
+  });
   if (result) return *result;
   report(tool, result.error());
   return exit_code(result.error());

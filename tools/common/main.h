@@ -15,6 +15,8 @@
 
 namespace voxkit::cli {
 
+class Json;
+
 /// What the work of a tool is given.
 class Run {
  public:
@@ -27,7 +29,8 @@ class Run {
 
   std::string tool;
   CommonOptions options;
-  Context ctx;  ///< its progress goes to the stage begun last
+  Context ctx;              ///< its progress goes to the stage begun last
+  bool json_lines = false;  ///< results are lines of JSON: there are several
 
   /// Begins a stage of work for the progress display, such as "encode".
   void stage(const std::string& name);
@@ -38,6 +41,8 @@ class Run {
   void say(const std::string& line);
   /// A line on standard error, with --verbose only.
   void note(const std::string& line) const;
+  /// Prints the result of --json.
+  Status print_result(const Json& json) const;
   /// Seconds since the tool started.
   double seconds() const;
 
@@ -54,6 +59,11 @@ class Run {
 int run_tool(int argc, char** argv, const std::string& tool, const std::string& purpose,
              const std::string& examples, const std::function<void(CommandLine&)>& declare,
              const std::function<Result<int>(Run&)>& work);
+
+/// What `work` returns, or the error of what it throws.
+Result<int> guarded(const std::function<Result<int>()>& work);
+/// The exit code of an error.
+int exit_code(const Error& error);
 
 /// One line about an error on standard error: "TOOL: FILE: what is wrong: what was expected".
 void report(const std::string& tool, const Error& error);

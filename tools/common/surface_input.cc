@@ -137,6 +137,10 @@ Surface open_any(const std::string& name, const SurfaceOptions& options, Context
 
 }  // namespace
 
+bool is_surface_file(const std::string& name) {
+  return is_mesh_name(name) || is_points_name(name) || has_ending(name, ".vox");
+}
+
 Surface open_surface(const std::string& name, const SurfaceOptions& options, Context& ctx) {
   Surface surface = named(open_any(name, options, ctx), name);
   if (!surface) return surface;

@@ -35,6 +35,9 @@ struct PlacedInput {
 Result<std::unique_ptr<color::SurfaceSource>> open_surfaces(std::span<const PlacedInput> inputs,
                                                             const SurfaceOptions& options, Context& ctx);
 
+/// Whether a file is a mesh, points or a model by its ending.
+bool is_surface_file(const std::string& name);
+
 /// Opens a surface; it can be read once. ErrorCode::usage where the options do not go with it.
 Result<std::unique_ptr<color::SurfaceSource>> open_surface(const std::string& name,
                                                            const SurfaceOptions& options, Context& ctx);
