@@ -3,9 +3,9 @@
 #include <bzlib.h>
 #include <fcntl.h>
 #include <fmt/format.h>
+#include <isa-l/igzip_lib.h>
 #include <sys/stat.h>
 #include <unistd.h>
-#include <zlib.h>
 
 #include <algorithm>
 #include <cerrno>
@@ -97,7 +97,7 @@ class UnpackStream : public InputStream {
     while (done < out.size() && !ended_) {
       VOX_CHECK(check_interrupt());
       if (broken_) return tl::unexpected<Error>(*broken_);
-      if (begin_ == filled_) VOX_CHECK(refill());
+      if (begin_ == filled_ && !has_more()) VOX_CHECK(refill());
       if (between_members_) {
         VOX_CHECK(next_member());
         continue;
@@ -121,6 +121,8 @@ class UnpackStream : public InputStream {
   /// (member_end).
   virtual Result<size_t> unpack(std::span<std::byte> out) = 0;
   virtual Status start_member() = 0;
+  /// Whether something may come without further input.
+  virtual bool has_more() const { return false; }
 
   void member_end() { between_members_ = true; }
   /// Says so, and keeps saying so: the library's state is not to be used again.
@@ -162,40 +164,53 @@ class UnpackStream : public InputStream {
   std::optional<Error> broken_;
 };
 
+/// By ISA-L, which takes half the time of zlib.
 class GunzipStream final : public UnpackStream {
  public:
   explicit GunzipStream(std::unique_ptr<InputStream> packed) : UnpackStream(std::move(packed), "gzip") {
-    ready_ = ::inflateInit2(&zlib_, 15 + 16) == Z_OK;  // the largest window; a gzip header and nothing else
-  }
-  ~GunzipStream() override {
-    if (ready_) ::inflateEnd(&zlib_);
+    ::isal_inflate_init(&state_);
+    state_.crc_flag = ISAL_GZIP;  // a header and a checksum
   }
 
  private:
   Status start_member() override {
-    ::inflateReset(&zlib_);
+    if (buffer_[begin_] != std::byte{0x1f}) return corrupt("expected gzip members");
+    ::isal_inflate_reset(&state_);
+    state_.crc_flag = ISAL_GZIP;
     return {};
   }
+  bool has_more() const override { return full_; }
   Result<size_t> unpack(std::span<std::byte> out) override {
-    if (!ready_) return fail(ErrorCode::limit, name_, "no memory to unpack gzip data");
-    zlib_.next_in = reinterpret_cast<Bytef*>(buffer_.data() + begin_);
-    zlib_.avail_in = static_cast<uInt>(filled_ - begin_);
-    zlib_.next_out = reinterpret_cast<Bytef*>(out.data());
-    zlib_.avail_out = static_cast<uInt>(out.size());
-    const int code = ::inflate(&zlib_, Z_NO_FLUSH);
-    begin_ = filled_ - zlib_.avail_in;
-    if (code == Z_STREAM_END) {
+    state_.next_in = reinterpret_cast<uint8_t*>(buffer_.data() + begin_);
+    state_.avail_in = static_cast<uint32_t>(filled_ - begin_);
+    state_.next_out = reinterpret_cast<uint8_t*>(out.data());
+    state_.avail_out = static_cast<uint32_t>(out.size());
+    const int code = ::isal_inflate(&state_);
+    begin_ = filled_ - state_.avail_in;
+    full_ = state_.avail_out == 0;
+    if (code < 0) return corrupt(reason(code));
+    if (state_.block_state == ISAL_BLOCK_FINISH) {
+      full_ = false;
       member_end();
-    } else if (code == Z_MEM_ERROR) {
-      return fail(ErrorCode::limit, name_, "no memory to unpack gzip data");
-    } else if (code != Z_OK && code != Z_BUF_ERROR) {
-      return corrupt(zlib_.msg ? zlib_.msg : "expected gzip members");
     }
-    return out.size() - zlib_.avail_out;
+    return out.size() - state_.avail_out;
+  }
+  static const char* reason(int code) {
+    switch (code) {
+      case ISAL_INVALID_WRAPPER:
+      case ISAL_UNSUPPORTED_METHOD:
+        return "expected gzip members";
+      case ISAL_INCORRECT_CHECKSUM:
+        return "the checksum is wrong";
+      case ISAL_INVALID_LOOKBACK:
+        return "a distance leads to before the data";
+      default:
+        return "a block or a code is none";
+    }
   }
 
-  z_stream zlib_{};
-  bool ready_ = false;
+  inflate_state state_;
+  bool full_ = false;  ///< the output was, so that there may be more in the state
 };
 
 class Bunzip2Stream final : public UnpackStream {

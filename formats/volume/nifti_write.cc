@@ -1,10 +1,12 @@
 // NIfTI-1 single files, .nii and .nii.gz.
 #include <fmt/format.h>
-#include <zlib.h>
+#include <libdeflate.h>
 
+#include <algorithm>
 #include <array>
 #include <cstring>
 
+#include "formats/parallel.h"
 #include "formats/volume/dense_sink.h"
 #include "formats/volume/facts.h"
 #include "formats/volume/nifti_header.h"
@@ -15,44 +17,54 @@ namespace {
 
 constexpr size_t most_description = 79;  // and a zero
 
-/// Samples packed with gzip as they come. The gzip header has no time and no name.
+/// Samples packed with gzip as they come: a member for each MiB, so that threads can pack them side by side
+/// and bytes do not depend on how many there are. The members' headers have no time and no name.
 class GzipSink final : public DenseSink {
  public:
-  using DenseSink::DenseSink;
-  ~GzipSink() override { ::deflateEnd(&zlib_); }
-  Status start(std::span<const std::byte> header) {
-    if (::deflateInit2(&zlib_, Z_DEFAULT_COMPRESSION, Z_DEFLATED, 15 + 16, 8, Z_DEFAULT_STRATEGY) != Z_OK)
-      return fail(ErrorCode::limit, file_->name(), "no memory to pack with gzip");
-    return put(header);
+  GzipSink(std::unique_ptr<OutputFile> file, const VolumeInfo& info, const SampleLayout& layout, Context& ctx)
+      : DenseSink(std::move(file), info, layout), packing_(ctx) {
+    packing_.progress = [](double) {};  // of what is written
+    waiting_.reserve(static_cast<size_t>(std::max(ctx.threads, 1)) * member_bytes);
   }
+  Status start(std::span<const std::byte> header) { return put(header); }
 
  protected:
   Status put(std::span<const std::byte> bytes) override {
     while (!bytes.empty()) {
-      const size_t take = std::min(bytes.size(), size_t{1} << 30);
-      VOX_CHECK(pack(bytes.first(take), Z_NO_FLUSH));
+      const size_t take = std::min(bytes.size(), waiting_.capacity() - waiting_.size());
+      waiting_.insert(waiting_.end(), bytes.begin(), bytes.begin() + static_cast<std::ptrdiff_t>(take));
       bytes = bytes.subspan(take);
+      if (waiting_.size() == waiting_.capacity()) VOX_CHECK(pack());
     }
     return {};
   }
-  Status complete() override { return pack({}, Z_FINISH); }
+  Status complete() override { return pack(); }
 
  private:
-  Status pack(std::span<const std::byte> bytes, int flush) {
-    zlib_.next_in = reinterpret_cast<Bytef*>(const_cast<std::byte*>(bytes.data()));
-    zlib_.avail_in = static_cast<uInt>(bytes.size());
-    do {
-      VOX_CHECK(check_interrupt());
-      zlib_.next_out = reinterpret_cast<Bytef*>(packed_.data());
-      zlib_.avail_out = static_cast<uInt>(packed_.size());
-      ::deflate(&zlib_, flush);
-      VOX_CHECK(file_->write(std::span(packed_).first(packed_.size() - zlib_.avail_out)));
-    } while (zlib_.avail_out == 0);
+  static constexpr size_t member_bytes = size_t{1} << 20;
+  static constexpr int level = 6;
+
+  Status pack() {
+    const std::span<const std::byte> all = waiting_;
+    std::vector<std::vector<std::byte>> members((all.size() + member_bytes - 1) / member_bytes);
+    VOX_CHECK(parallel_for(packing_, static_cast<int64_t>(members.size()), [&](int64_t task) -> Status {
+      const auto i = static_cast<size_t>(task);
+      const auto part = all.subspan(i * member_bytes, std::min(member_bytes, all.size() - i * member_bytes));
+      const std::unique_ptr<libdeflate_compressor, decltype(&libdeflate_free_compressor)> compressor(
+          libdeflate_alloc_compressor(level), &libdeflate_free_compressor);
+      if (!compressor) return fail(ErrorCode::limit, file_->name(), "no memory to pack with gzip");
+      members[i].resize(libdeflate_gzip_compress_bound(compressor.get(), part.size()));
+      members[i].resize(libdeflate_gzip_compress(compressor.get(), part.data(), part.size(),
+                                                 members[i].data(), members[i].size()));
+      return {};
+    }));
+    for (const std::vector<std::byte>& member : members) VOX_CHECK(file_->write(member));
+    waiting_.clear();
     return {};
   }
 
-  z_stream zlib_{};
-  std::vector<std::byte> packed_ = std::vector<std::byte>(size_t{256} << 10);
+  Context packing_;
+  std::vector<std::byte> waiting_;
 };
 
 nifti_1_header make_header(const std::string& path, const VolumeInfo& info, const SampleLayout& layout,
@@ -102,7 +114,7 @@ SinkResult create_nifti(const std::string& path, const VolumeInfo& info, bool fo
   std::array<std::byte, 352> bytes{};  // four zeros after the header: no extensions
   std::memcpy(bytes.data(), &header, sizeof(header));
   if (has_ending(path, ".gz")) {
-    auto sink = std::make_unique<GzipSink>(std::move(file), info, layout);
+    auto sink = std::make_unique<GzipSink>(std::move(file), info, layout, ctx);
     VOX_CHECK(sink->start(bytes));
     return sink;
   }
