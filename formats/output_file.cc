@@ -92,9 +92,9 @@ std::string random_suffix() {
 enum class Kind { standard_output, through, file };
 
 Result<Kind> classify(const std::string& path, bool force) {
-  if (path == "-") {
+  if (is_standard_output(path)) {
     if (isatty(STDOUT_FILENO)) {
-      return output_error("-", "standard output is a terminal: binary data goes to a file or a pipe");
+      return output_error(path, "standard output is a terminal: binary data goes to a file or a pipe");
     }
     return Kind::standard_output;
   }
@@ -121,6 +121,10 @@ Result<Kind> classify(const std::string& path, bool force) {
 }
 
 }  // namespace
+
+bool is_standard_output(std::string_view path) {
+  return path == "-" || (path.starts_with("-.") && path.find('/') == path.npos);
+}
 
 Status check_output(const std::string& path, bool force) {
   VOX_CHECK(classify(path, force));

@@ -6,6 +6,7 @@
 #include <memory>
 #include <span>
 #include <string>
+#include <string_view>
 
 #include "formats/result.h"
 
@@ -14,7 +15,7 @@ namespace voxkit {
 /// Bytes written beside the final name and renamed over it by `commit`. Until then, and after any error,
 /// signal or crash, the final name is untouched; the temporary is removed by the destructor and by SIGINT,
 /// SIGTERM and SIGHUP.
-/// "-" is standard output, written through as it comes; refused where that is a terminal.
+/// "-", or "-.ENDING", is standard output, written through as it comes; refused where that is a terminal.
 class OutputFile {
  public:
   /// Fails with ErrorCode::output if `path` exists and not `force`, or if its folder cannot be written.
@@ -54,6 +55,9 @@ class OutputFile {
 /// `commit` of several files that belong together: all of them have their names then, or none. Where one
 /// cannot, those before it lose theirs again, and the old files are back.
 Status commit_together(std::span<const std::unique_ptr<OutputFile>> files);
+
+/// Whether a name is that of standard output: "-", or "-.ENDING", whose ending says what is written to it.
+bool is_standard_output(std::string_view path);
 
 /// The checks of `OutputFile::create` without creating anything: for a tool to run before any work.
 Status check_output(const std::string& path, bool force);

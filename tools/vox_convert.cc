@@ -6,6 +6,7 @@
 #include "formats/copy.h"
 #include "formats/fill.h"
 #include "formats/orient.h"
+#include "formats/output_file.h"
 #include "formats/volume/open_volume.h"
 #include "formats/volume/readers.h"
 #include "tools/common/input.h"
@@ -132,7 +133,7 @@ Result<int> work(Options& o, Run& run) {
     o.output_type = *type;
     o.open.round_wide = o.output_type->format == VoxelFormat::float32;
   }
-  if (run.options.json && o.output == "-")
+  if (run.options.json && is_standard_output(o.output))
     return bad_usage("--json and the output - both use standard output");
   VOX_CHECK(check_distinct(o.input, o.output));
   o.open.outputs = is_numbered(o.output) ? std::vector{o.output} : files_of_output(o.output);

@@ -7,6 +7,7 @@
 #include "formats/copy.h"
 #include "formats/fill.h"
 #include "formats/mesh/voxel_faces.h"
+#include "formats/output_file.h"
 #include "formats/volume/open_volume.h"
 #include "formats/volume/readers.h"
 #include "libcolor/edit/levels.h"
@@ -164,7 +165,7 @@ void report_losses(const Options& o, const std::vector<svmm::Losses::Page>& page
 }
 
 Result<int> work(const Options& o, Run& run) {
-  if (run.options.json && o.output == "-")
+  if (run.options.json && is_standard_output(o.output))
     return bad_usage("--json and the output - both use standard output");
   if (o.tiles) return write_images(o, run);
   VOX_CHECK(check_distinct(o.input, o.output));

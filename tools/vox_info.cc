@@ -9,6 +9,7 @@
 #include "formats/volume/volume_formats.h"
 #include "tools/common/attributes.h"
 #include "tools/common/color_report.h"
+#include "tools/common/formats_report.h"
 #include "tools/common/input.h"
 #include "tools/common/json.h"
 #include "tools/common/main.h"
@@ -21,11 +22,12 @@ namespace {
 struct Options {
   std::string file;
   OpenOptions open;
-  bool check = false;
+  bool check = false, formats = false;
 };
 
 void declare(CommandLine& line, Options& o) {
-  line.argument("FILE", "Volume file, folder, built-in or -", o.file);
+  line.argument("FILE", "Volume file, folder, built-in or -", o.file, false);
+  line.flag("--formats", "List the formats of volumes, and what files of each hold, instead", o.formats);
   line.flag("--check", "Verify every checksum and the whole structure; exit 1 if something is wrong",
             o.check);
   declare_input_options(line, o.open);
@@ -36,9 +38,7 @@ std::string_view format_of(const std::string& file, const Input& input) {
   if (input.vq) return "vqv";
   if (input.color) return "dagc";
   if (is_builtin(file)) return "builtin";
-  if (file == "-") return "nrrd";
-  const VolumeFormat* const format = find_volume_format(file);
-  return format ? format->name : "slices";
+  return input.format ? input.format->name : "slices";
 }
 
 std::string_view codec_of(const Input& input) {
@@ -225,6 +225,12 @@ class NullSink : public VolumeSink {
 };
 
 Result<int> work(const Options& o, Run& run) {
+  if (o.formats) {
+    if (!o.file.empty()) return bad_usage("--formats: is of no file: leave FILE out");
+    VOX_CHECK(print(run.options.json ? formats_json(run).text() : formats_text()));
+    return 0;
+  }
+  if (o.file.empty()) return bad_usage("FILE is required: see --help");
   OpenOptions open = o.open;
   open.any_part = true;
   VOX_TRY(const Input input, open_input(o.file, open, run.ctx));
@@ -265,6 +271,7 @@ int main(int argc, char** argv) {
       argc, argv, "vox-info", "Shows what is in a volume file.",
       "  vox-info head.nii.gz\n"
       "  vox-info head.svmm --json\n"
-      "  vox-info head.vqv --check\n",
+      "  vox-info head.vqv --check\n"
+      "  vox-info --formats\n",
       [&](CommandLine& line) { declare(line, options); }, [&](Run& run) { return work(options, run); });
 }

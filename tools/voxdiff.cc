@@ -10,6 +10,7 @@
 #include "formats/fill.h"
 #include "formats/image/image.h"
 #include "formats/names.h"
+#include "formats/output_file.h"
 #include "formats/volume/open_volume.h"
 #include "libcolor/attributes/attribute_selection.h"
 #include "libcolor/edit/levels.h"
@@ -351,7 +352,8 @@ bool is_image_file(const std::string& name) {
 Result<int> work(const Options& o, Run& run) {
   if (o.a == "-" && o.b == "-") return bad_usage("A and B are both standard input: expected one - at most");
   if (!o.errors.empty()) {
-    if (o.errors == "-") return bad_usage("the errors cannot go to standard output: expected a file");
+    if (is_standard_output(o.errors))
+      return bad_usage("the errors cannot go to standard output: expected a file");
     VOX_CHECK(check_distinct(o.a, o.errors));
     VOX_CHECK(check_distinct(o.b, o.errors));
     VOX_CHECK(is_image_name(o.errors) ? check_image_output(o.errors, run.options.force)

@@ -62,11 +62,21 @@ Result<const VolumeFormat*> writer_of(const std::string& name) {
                 writable.empty() ? "files of this kind are read only"
                                  : fmt::format("files with this ending are read only: expected {}",
                                                fmt::join(writable, " ")));
+  const auto piped = format->endings.first(format->piped);
+  if (is_standard_output(name) &&
+      std::none_of(piped.begin(), piped.end(),
+                   [&](const std::string_view ending) { return has_ending(name, ending); }))
+    return fail(ErrorCode::usage, name,
+                "files of this kind cannot be written to standard output: name a file");
   return format;
 }
 
 SourceResult open_as_it_is(const std::string& name, const OpenOptions& options, Context& ctx) {
-  if (name == "-") return open_nrrd(name, options, ctx);
+  if (name == "-") {
+    VOX_TRY(auto stream, open_stream(name));
+    VOX_TRY(KnownStream known, recognise(std::move(stream)));
+    return known.format->open_stream(std::move(known.stream), options, ctx);
+  }
   if (is_builtin(name)) return open_builtin(name);
   std::error_code error;
   const fs::file_status status = fs::status(name, error);
@@ -107,12 +117,11 @@ Result<std::unique_ptr<VolumeSink>> create_volume(const std::string& name, const
   const bool wide =
       is_wide(info.sample_type) && info.format != VoxelFormat::float32 && !is_color(info.format);
   if (wide && !format->wide_integers)
-    return fail(
-        ErrorCode::usage, name,
-        fmt::format(
-            "files with this ending hold no {}: expected .nrrd, .nii or .raw, or another type (--type, or "
-            "--output-type of vox-convert)",
-            voxkit::name(info.sample_type)));
+    return fail(ErrorCode::usage, name,
+                fmt::format("files with this ending hold no {}: expected .nrrd, .nii, .npy or .raw, or "
+                            "another type (--type, or "
+                            "--output-type of vox-convert)",
+                            voxkit::name(info.sample_type)));
   return format->create(name, info, force, ctx);
 }
 
@@ -140,7 +149,7 @@ Status check_not_written(const VolumeInfo& info, const OpenOptions& options) {
 
 std::vector<std::string> files_of_output(const std::string& name) {
   const VolumeFormat* const format = find_volume_format(name);
-  if (name == "-" || (format && format->images)) return {};
+  if (is_standard_output(name) || (format && format->images)) return {};
   std::vector<std::string> files{name};
   if (const std::string data = nrrd_data_file(name); !data.empty()) files.push_back(data);
   return files;

@@ -41,7 +41,8 @@ struct OpenOptions {
   std::string other_kinds = {};
 };
 
-/// Opens a file or a built-in by its name; reads headers, no voxels. "-" is NRRD on standard input.
+/// Opens a file or a built-in by its name; reads headers, no voxels. "-" is standard input:
+/// NRRD or a NumPy array, told apart by its first bytes.
 /// Compressed volumes (.svmm …) are opened by the tools, since formats/ knows no codec.
 /// Errors: ErrorCode::input with file, section and rule; ErrorCode::usage for a name that cannot be an input.
 Result<std::unique_ptr<VolumeSource>> open_volume(const std::string& name, const OpenOptions& options,
@@ -50,9 +51,9 @@ Result<std::unique_ptr<VolumeSource>> open_volume(const std::string& name, const
 /// True if `name` is a built-in such as "menger:5" (which need not be well-formed).
 bool is_builtin(const std::string& name);
 
-/// Starts a volume file of the kind that `name` ends in: .nrrd .nhdr .nii .nii.gz .raw .mrc .vdb, a printf
-/// pattern of images (a folder for slices), "-" (NRRD). Refuses what the kind cannot hold (ErrorCode::usage)
-/// before creating anything.
+/// Starts a volume file of the kind that `name` ends in: .nrrd .nhdr .nii .nii.gz .npy .raw .mrc .vdb, a
+/// printf pattern of images (a folder for slices), "-" (NRRD); "-.npy" is standard output in that format.
+/// Refuses what the kind cannot hold (ErrorCode::usage) before creating anything.
 Result<std::unique_ptr<VolumeSink>> create_volume(const std::string& name, const VolumeInfo& info, bool force,
                                                   Context& ctx);
 

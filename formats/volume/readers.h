@@ -29,6 +29,13 @@ SinkResult create_nrrd(const std::string& path, const VolumeInfo& info, bool for
 /// The file of samples that goes with a detached header; empty for other names.
 std::string nrrd_data_file(const std::string& path);
 
+// npy.cc: NumPy arrays of 1 to 5 axes, [time, channel,] z, y, x, in either order of memory, and colours (3 or
+// 4 u8) along the last one of 4 or more; every type of numbers, both endians. Written with version 1.0, in C
+// order.
+SourceResult open_npy(const std::string& path, const OpenOptions& options, Context& ctx);
+SourceResult open_npy(std::unique_ptr<InputStream> stream, const OpenOptions& options, Context& ctx);
+SinkResult create_npy(const std::string& path, const VolumeInfo& info, bool force, Context& ctx);
+
 // raw.cc: headerless samples, x fastest.
 SourceResult open_raw(const std::string& path, const OpenOptions& options, Context& ctx);
 SinkResult create_raw(const std::string& path, const VolumeInfo& info, bool force, Context& ctx);

@@ -33,6 +33,7 @@ OUTPUTS = {
     "nii": ("vox-convert", [SCALAR], "a.nii"),
     "nii.gz": ("vox-convert", [SCALAR], "a.nii.gz"),
     "mrc": ("vox-convert", [SCALAR], "a.mrc"),
+    "npy": ("vox-convert", [SCALAR], "a.npy"),
     "raw": ("vox-convert", [SCALAR], "a.raw"),
     "vdb": ("vox-convert", [SCALAR], "a.vdb"),
     "stack of png": ("vox-convert", [SCALAR], "s-%03d.png"),

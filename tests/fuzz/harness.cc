@@ -236,6 +236,15 @@ Verdict read_mrc(Input input) {
   return read_source([&](Context& ctx) { return open_mrc(path, any_part(), ctx); });
 }
 
+Verdict read_npy(Input input) {
+  const std::string path = put(input, "in.npy");
+  if (auto verdict = read_source([&](Context& ctx) { return open_npy(path, any_part(), ctx); });
+      !verdict.fault.empty())
+    return verdict;
+  return read_source(
+      [&](Context& ctx) { return open_npy(std::make_unique<MemoryStream>(input), any_part(), ctx); });
+}
+
 Verdict read_raw(Input input) {
   if (input.size() < 7) return {};
   const auto byte = [&](size_t i) { return std::to_integer<int64_t>(input[i]); };
@@ -319,6 +328,7 @@ const std::vector<Reader>& readers() {
       {"nrrd", nullptr, read_nrrd, nrrd_seeds},
       {"nifti", nullptr, read_nifti, nifti_seeds},
       {"mrc", nullptr, read_mrc, mrc_seeds},
+      {"npy", nullptr, read_npy, npy_seeds},
       {"raw", nullptr, read_raw, raw_seeds},
       {"gunzip", nullptr, read_gunzip, gunzip_seeds},
       {"bunzip2", nullptr, read_bunzip2, bunzip2_seeds},

@@ -189,6 +189,22 @@ std::vector<std::string> mrc_seeds() {
           written("s.mrc", {3, 2, 4}, VoxelFormat::float32, SampleType::f32), half, stack, turned};
 }
 
+std::vector<std::string> npy_seeds() {
+  const auto array = [](const std::string& type, const std::string& order, const std::string& shape,
+                        size_t bytes) {
+    const std::string text =
+        "{\"descr\": '" + type + "', 'fortran_order': " + order + ", 'shape': (" + shape + ")}";
+    return "\x93NUMPY\2" + std::string(1, '\0') + le(static_cast<uint32_t>(text.size())) + text +
+           pattern(bytes);
+  };
+  return {written("s.npy", {4, 3, 2}, VoxelFormat::density16, SampleType::i16),
+          written("s.npy", {4, 3, 2}, VoxelFormat::rgba32),
+          array(">f4", "True", "2, 3, 4", 96),
+          array("<i8", "False", "2, 1, 3L, 1, 2", 96),
+          array("|b1", "False", "7,", 7),
+          array("<f8", "True", "1, 2, 3, 4", 192)};
+}
+
 std::vector<std::string> raw_seeds() {
   const auto options = [](int type, int order) {
     return std::string("\3\0\2\0\4\0", 6) + static_cast<char>(2 * type + order);

@@ -141,8 +141,9 @@ void CommandLine::flag(const std::string& names, const std::string& help, bool& 
   state_->app.add_flag(names, value, help);
 }
 
-void CommandLine::argument(const std::string& metavar, const std::string& help, std::string& value) {
-  state_->app.add_option(metavar, value, help)->required()->type_name("");
+void CommandLine::argument(const std::string& metavar, const std::string& help, std::string& value,
+                           bool required) {
+  state_->app.add_option(metavar, value, help)->required(required)->type_name("");
 }
 
 void CommandLine::arguments(const std::string& metavar, const std::string& help,

@@ -41,8 +41,10 @@ class CommandLine {
   void file(const std::string& names, const std::string& metavar, const std::string& help, std::string& value,
             bool required = false);
   void flag(const std::string& names, const std::string& help, bool& value);
-  /// An argument without a name, which must be given and names a file; in the order of the calls.
-  void argument(const std::string& metavar, const std::string& help, std::string& value);
+  /// An argument without a name, which must be given, unless not `required`, and names a file; in the order
+  /// of the calls.
+  void argument(const std::string& metavar, const std::string& help, std::string& value,
+                bool required = true);
   /// One such argument, or more; the last of the calls.
   void arguments(const std::string& metavar, const std::string& help, std::vector<std::string>& values);
   /// An option that may come after each of the `arguments`, and is of that one. `store` is called with the

@@ -65,10 +65,11 @@ void declare_zstd(CommandLine& line, int& level) {
 }
 
 Status check_encoding(const std::string& input, const std::string& output, bool verify, const Run& run) {
-  if (run.options.json && output == "-") return bad_usage("--json and the output - both use standard output");
+  if (run.options.json && is_standard_output(output))
+    return bad_usage("--json and the output - both use standard output");
   VOX_CHECK(check_output(output, run.options.force));
   VOX_CHECK(check_distinct(input, output));
-  if (verify && output == "-")
+  if (verify && is_standard_output(output))
     return bad_usage("--verify: cannot read back what went to standard output: name a file");
   return {};
 }

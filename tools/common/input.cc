@@ -14,7 +14,6 @@
 #include "formats/fill.h"
 #include "formats/input_stream.h"
 #include "formats/mapped_file.h"
-#include "formats/volume/readers.h"
 #include "formats/volume/volume_formats.h"
 #include "libcolor/edit/levels.h"
 #include "libcolor/terrain/terrain.h"
@@ -166,14 +165,25 @@ Result<Input> open_compressed(const std::string& name, std::optional<int> level,
   return open_codec(std::move(container), level, ctx);
 }
 
+namespace {
+
+/// A volume that is not compressed, by its first bytes.
+Result<Input> open_plain(std::unique_ptr<InputStream> stream, const OpenOptions& options, Context& ctx) {
+  VOX_TRY(KnownStream known, recognise(std::move(stream)));
+  Input input;
+  input.format = known.format;
+  VOX_TRY(input.source, known.format->open_stream(std::move(known.stream), options, ctx));
+  return input;
+}
+
+}  // namespace
+
 Result<Input> open_spooled(std::shared_ptr<const MappedFile> file, const OpenOptions& options, Context& ctx) {
   if (is_container(file->bytes())) {
     VOX_TRY(auto container, container_of(std::move(file), ctx));
     return open_codec(std::move(container), std::nullopt, ctx);
   }
-  Input input;
-  VOX_TRY(input.source, open_nrrd(stream_of(std::move(file)), options, ctx));
-  return input;
+  return open_plain(stream_of(std::move(file)), options, ctx);
 }
 
 namespace {
@@ -185,14 +195,12 @@ Result<Input> open_as_it_is(const std::string& name, const OpenOptions& options,
                 "a built-in surface, not a volume: dagcolor-pack makes a .dagc file of it");
   Input input;
   if (name != "-") {
+    input.format = find_volume_format(name);
     VOX_TRY(input.source, open_volume(name, options, ctx));
     return input;
   }
   VOX_TRY(Peeked peeked, peek_standard_input());
-  if (!peeked.container) {
-    VOX_TRY(input.source, open_nrrd(std::move(peeked.stream), options, ctx));
-    return input;
-  }
+  if (!peeked.container) return open_plain(std::move(peeked.stream), options, ctx);
   VOX_TRY(auto file, MappedFile::spool(*peeked.stream));
   return open_spooled(std::move(file), options, ctx);
 }

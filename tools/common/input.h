@@ -7,6 +7,7 @@
 #include <string>
 
 #include "formats/volume/open_volume.h"
+#include "formats/volume/volume_formats.h"
 #include "libcolor/color.h"
 #include "libsvmm/packed/packed.h"
 #include "libsvmm/svmm.h"
@@ -21,15 +22,17 @@ struct Input {
   std::shared_ptr<const svmm::PackedVolume> packed;  ///< null for all but .svmm of layout packed
   std::shared_ptr<const vq::Volume> vq;              ///< null for all but .vqv
   std::shared_ptr<const color::Volume> color;        ///< null for all but .dagc
+  const VolumeFormat* format = nullptr;              ///< of a file or stream that is not compressed
 };
 
 /// Declares --dims, --endian, --grid and what else OpenOptions has, and with `type` also --type as the type
 /// of a .raw input.
 void declare_input_options(CommandLine& line, OpenOptions& options, bool type = true);
 
-/// Opens a file, a built-in, or standard input ("-": a container or NRRD, told apart by its first bytes).
+/// Opens a file, a built-in, or standard input ("-": a container, NRRD or NumPy's, told apart by its
+/// first bytes).
 Result<Input> open_input(const std::string& name, const OpenOptions& options, Context& ctx);
-/// Opens what standard input held: a container or NRRD. It can be opened any number of times.
+/// Opens what standard input held: a container, NRRD or NumPy's. It can be opened any number of times.
 Result<Input> open_spooled(std::shared_ptr<const MappedFile> file, const OpenOptions& options, Context& ctx);
 /// Opens a compressed volume only. `level`: of the mip-map, as the voxels of the source; none: the finest
 /// that there is, which for a packed file that was cut is not level 0. That is noted in a line.
