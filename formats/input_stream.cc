@@ -164,23 +164,28 @@ class UnpackStream : public InputStream {
   std::optional<Error> broken_;
 };
 
+enum class Deflated { gzip, either };  ///< which header is expected: gzip's, or that or zlib's
+
 /// By ISA-L, which takes half the time of zlib.
-class GunzipStream final : public UnpackStream {
+class InflateStream final : public UnpackStream {
  public:
-  explicit GunzipStream(std::unique_ptr<InputStream> packed) : UnpackStream(std::move(packed), "gzip") {
+  InflateStream(std::unique_ptr<InputStream> packed, Deflated header)
+      : UnpackStream(std::move(packed), header == Deflated::gzip ? "gzip" : "zlib"), header_(header) {
     ::isal_inflate_init(&state_);
-    state_.crc_flag = ISAL_GZIP;  // a header and a checksum
   }
 
  private:
   Status start_member() override {
-    if (buffer_[begin_] != std::byte{0x1f}) return corrupt("expected gzip members");
+    const bool gzip = buffer_[begin_] == std::byte{0x1f};
+    if (header_ == Deflated::gzip && !gzip) return corrupt("expected gzip members");
     ::isal_inflate_reset(&state_);
-    state_.crc_flag = ISAL_GZIP;
+    state_.crc_flag = gzip ? ISAL_GZIP : ISAL_ZLIB;  // a header and a checksum
+    started_ = true;
     return {};
   }
   bool has_more() const override { return full_; }
   Result<size_t> unpack(std::span<std::byte> out) override {
+    if (!started_) VOX_CHECK(start_member());
     state_.next_in = reinterpret_cast<uint8_t*>(buffer_.data() + begin_);
     state_.avail_in = static_cast<uint32_t>(filled_ - begin_);
     state_.next_out = reinterpret_cast<uint8_t*>(out.data());
@@ -188,18 +193,20 @@ class GunzipStream final : public UnpackStream {
     const int code = ::isal_inflate(&state_);
     begin_ = filled_ - state_.avail_in;
     full_ = state_.avail_out == 0;
-    if (code < 0) return corrupt(reason(code));
+    if (code < 0 || code == ISAL_NEED_DICT) return corrupt(reason(code));
     if (state_.block_state == ISAL_BLOCK_FINISH) {
       full_ = false;
       member_end();
     }
     return out.size() - state_.avail_out;
   }
-  static const char* reason(int code) {
+  const char* reason(int code) const {
     switch (code) {
       case ISAL_INVALID_WRAPPER:
       case ISAL_UNSUPPORTED_METHOD:
-        return "expected gzip members";
+        return header_ == Deflated::gzip ? "expected gzip members" : "expected a header of zlib or gzip";
+      case ISAL_NEED_DICT:
+        return "expected no dictionary";
       case ISAL_INCORRECT_CHECKSUM:
         return "the checksum is wrong";
       case ISAL_INVALID_LOOKBACK:
@@ -209,7 +216,9 @@ class GunzipStream final : public UnpackStream {
     }
   }
 
+  Deflated header_;
   inflate_state state_;
+  bool started_ = false;
   bool full_ = false;  ///< the output was, so that there may be more in the state
 };
 
@@ -338,7 +347,10 @@ Result<std::unique_ptr<InputStream>> open_stream(const std::string& path) {
 }
 
 std::unique_ptr<InputStream> gunzip(std::unique_ptr<InputStream> packed) {
-  return std::make_unique<GunzipStream>(std::move(packed));
+  return std::make_unique<InflateStream>(std::move(packed), Deflated::gzip);
+}
+std::unique_ptr<InputStream> inflate(std::unique_ptr<InputStream> packed) {
+  return std::make_unique<InflateStream>(std::move(packed), Deflated::either);
 }
 std::unique_ptr<InputStream> bunzip2(std::unique_ptr<InputStream> packed) {
   return std::make_unique<Bunzip2Stream>(std::move(packed));

@@ -2,6 +2,7 @@
 #pragma once
 
 #include <memory>
+#include <utility>
 #include <vector>
 
 #include "formats/output_file.h"
@@ -45,6 +46,18 @@ class DenseSink : public VolumeSink {
   std::vector<float> floats_;  ///< of each stored value, where these are not what is written
   std::byte bits_{0};          ///< of a byte begun, where samples are bits
   int bit_count_ = 0;
+};
+
+/// Samples in a file of their own, then the header: who finds the header finds the data.
+class DetachedSink final : public DenseSink {
+ public:
+  DetachedSink(std::unique_ptr<OutputFile> header, std::unique_ptr<OutputFile> data, const VolumeInfo& info,
+               const SampleLayout& layout)
+      : DenseSink(std::move(data), info, layout), header_(std::move(header)) {}
+
+ private:
+  Status committed() override { return header_->commit(); }
+  std::unique_ptr<OutputFile> header_;
 };
 
 }  // namespace voxkit

@@ -1,7 +1,6 @@
 // The text header of NRRD files: what nrrd.cc reads and writes before the samples.
 #pragma once
 
-#include <charconv>
 #include <cstdint>
 #include <map>
 #include <optional>
@@ -14,23 +13,9 @@
 #include "formats/volume.h"
 #include "formats/volume/dense_source.h"
 #include "formats/volume/strided_source.h"
+#include "formats/volume/words.h"
 
 namespace voxkit::nrrd {
-
-/// Without blanks and tabs at its ends.
-std::string_view trim(std::string_view s);
-/// ASCII letters in lower case; the format's names do not depend on case.
-std::string lower(std::string_view s);
-/// What stands between blanks and tabs.
-std::vector<std::string_view> words(std::string_view s);
-/// A number that takes up all of `s`; nothing where there is none, or where T does not hold it.
-template <class T>
-std::optional<T> number(std::string_view s) {
-  T value{};
-  const auto [end, error] = std::from_chars(s.data(), s.data() + s.size(), value);
-  if (error != std::errc{} || end != s.data() + s.size()) return std::nullopt;
-  return value;
-}
 
 /// The value of a field or of a key, and the line it is on.
 struct Field {

@@ -118,7 +118,7 @@ Result<std::unique_ptr<VolumeSink>> create_volume(const std::string& name, const
       is_wide(info.sample_type) && info.format != VoxelFormat::float32 && !is_color(info.format);
   if (wide && !format->wide_integers)
     return fail(ErrorCode::usage, name,
-                fmt::format("files with this ending hold no {}: expected .nrrd, .nii, .npy or .raw, or "
+                fmt::format("files with this ending hold no {}: expected .nrrd, .nii, .mha, .npy or .raw, or "
                             "another type (--type, or "
                             "--output-type of vox-convert)",
                             voxkit::name(info.sample_type)));
@@ -151,7 +151,7 @@ std::vector<std::string> files_of_output(const std::string& name) {
   const VolumeFormat* const format = find_volume_format(name);
   if (is_standard_output(name) || (format && format->images)) return {};
   std::vector<std::string> files{name};
-  if (const std::string data = nrrd_data_file(name); !data.empty()) files.push_back(data);
+  if (const std::string data = detached_data_file(name); !data.empty()) files.push_back(data);
   return files;
 }
 

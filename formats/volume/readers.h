@@ -26,8 +26,23 @@ SourceResult open_nrrd(const std::string& path, const OpenOptions& options, Cont
 SourceResult open_nrrd(std::unique_ptr<InputStream> stream, const OpenOptions& options, Context& ctx);
 /// Raw little-endian data with attached header; .nhdr: header and, beside it, NAME.raw.
 SinkResult create_nrrd(const std::string& path, const VolumeInfo& info, bool force, Context& ctx);
-/// The file of samples that goes with a detached header; empty for other names.
-std::string nrrd_data_file(const std::string& path);
+
+// data_files.cc
+/// The file of samples that goes with a detached header, .nhdr or .mhd; empty for other names.
+std::string detached_data_file(const std::string& path);
+
+// meta_image.cc: MetaImage, .mha and .mhd: data after the header, in a file, a list of files or a pattern;
+// raw, zlib and text; both endians; up to 3 axes of space and one of time, channels, colours of 3 or 4 u8.
+// Written raw: .mha in one file, .mhd with NAME.raw beside it.
+SourceResult open_meta_image(const std::string& path, const OpenOptions& options, Context& ctx);
+SinkResult create_meta_image(const std::string& path, const VolumeInfo& info, bool force, Context& ctx);
+
+// vti.cc: VTK's image data as XML, .vti.
+SourceResult open_vti(const std::string& path, const OpenOptions& options, Context& ctx);
+SinkResult create_vti(const std::string& path, const VolumeInfo& info, bool force, Context& ctx);
+// vtk_legacy.cc: VTK's structured points, .vtk, in text or binary.
+SourceResult open_vtk(const std::string& path, const OpenOptions& options, Context& ctx);
+SinkResult create_vtk(const std::string& path, const VolumeInfo& info, bool force, Context& ctx);
 
 // npy.cc: NumPy arrays of 1 to 5 axes, [time, channel,] z, y, x, in either order of memory, and colours (3 or
 // 4 u8) along the last one of 4 or more; every type of numbers, both endians. Written with version 1.0, in C

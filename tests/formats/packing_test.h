@@ -8,9 +8,10 @@
 
 namespace voxkit {
 
-inline std::string gzip_text(std::string text) {
+/// `window`: the header that zlib puts around it.
+inline std::string deflated_text(std::string text, int window) {
   z_stream z{};
-  deflateInit2(&z, 6, Z_DEFLATED, 15 + 16, 8, Z_DEFAULT_STRATEGY);
+  deflateInit2(&z, 6, Z_DEFLATED, window, 8, Z_DEFAULT_STRATEGY);
   std::string packed(text.size() + 1000 + text.size() / 100, '\0');
   z.next_in = reinterpret_cast<Bytef*>(text.data());
   z.avail_in = static_cast<uInt>(text.size());
@@ -20,6 +21,13 @@ inline std::string gzip_text(std::string text) {
   packed.resize(z.total_out);
   deflateEnd(&z);
   return packed;
+}
+
+inline std::string gzip_text(const std::string& text) {
+  return deflated_text(text, 15 + 16);
+}
+inline std::string zlib_text(const std::string& text) {
+  return deflated_text(text, 15);
 }
 
 inline std::string bzip2_text(std::string text) {

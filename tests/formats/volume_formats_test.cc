@@ -50,7 +50,8 @@ std::optional<bool> holds(const std::string& name, const Type& type, Context& ct
     if (sink.error().what.find("lib") != std::string::npos) return std::nullopt;
     return false;
   }
-  if (!(*sink)->write(0, 2, packed(std::as_const(voxels).data(), info.dims, info.format)) || !(*sink)->finish())
+  if (!(*sink)->write(0, 2, packed(std::as_const(voxels).data(), info.dims, info.format)) ||
+      !(*sink)->finish())
     return false;
   OpenOptions options;
   if (has_ending(name, ".raw")) {

@@ -245,6 +245,11 @@ Verdict read_npy(Input input) {
       [&](Context& ctx) { return open_npy(std::make_unique<MemoryStream>(input), any_part(), ctx); });
 }
 
+Verdict read_meta_image(Input input) {
+  const std::string path = put(input, "in.mha");
+  return read_source([&](Context& ctx) { return open_meta_image(path, any_part(), ctx); });
+}
+
 Verdict read_raw(Input input) {
   if (input.size() < 7) return {};
   const auto byte = [&](size_t i) { return std::to_integer<int64_t>(input[i]); };
@@ -329,6 +334,7 @@ const std::vector<Reader>& readers() {
       {"nifti", nullptr, read_nifti, nifti_seeds},
       {"mrc", nullptr, read_mrc, mrc_seeds},
       {"npy", nullptr, read_npy, npy_seeds},
+      {"meta_image", nullptr, read_meta_image, meta_image_seeds},
       {"raw", nullptr, read_raw, raw_seeds},
       {"gunzip", nullptr, read_gunzip, gunzip_seeds},
       {"bunzip2", nullptr, read_bunzip2, bunzip2_seeds},

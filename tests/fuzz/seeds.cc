@@ -205,6 +205,22 @@ std::vector<std::string> npy_seeds() {
           array("<f8", "True", "1, 2, 3, 4", 192)};
 }
 
+std::vector<std::string> meta_image_seeds() {
+  const std::string image = "ObjectType = Image\nNDims = ", byte = "\nElementType = MET_UCHAR\n";
+  return {
+      written("s.mha", {4, 3, 2}, VoxelFormat::density16, SampleType::i16),
+      written("s.mha", {4, 3, 2}, VoxelFormat::rgba32),
+      image + "3\nDimSize = 4 3 2" + byte + "CompressedData = True\nElementDataFile = LOCAL\n" +
+          zlib_text(pattern(24)),
+      image +
+          "4\nDimSize = 2 3 2 2\nElementType = MET_DOUBLE\nElementByteOrderMSB = True\nOffset = 1 2 3 0\n"
+          "ElementSpacing = 1 2 3 1\nHeaderSize = -1\nElementDataFile = LOCAL\n" +
+          pattern(192),
+      image + "2\nDimSize = 3 2" + byte +
+          "TransformMatrix = 0 1 -1 0\nElementNumberOfChannels = 2\nBinaryData = False\nDistanceUnits = um\n"
+          "AnatomicalOrientation = ???\nElementDataFile = LOCAL\n1 2 3 4 5 6 7 8 9 10 11 12\n"};
+}
+
 std::vector<std::string> raw_seeds() {
   const auto options = [](int type, int order) {
     return std::string("\3\0\2\0\4\0", 6) + static_cast<char>(2 * type + order);

@@ -65,6 +65,7 @@ KINDS = {
     "nifti": (["vox-convert", "membrane:20,12,8:1"], "a.nii", VOLUME),
     "gzip": (["vox-convert", "membrane:20,12,8:1"], "a.nii.gz", VOLUME),
     "mrc": (["vox-convert", "membrane:20,12,8:1"], "a.mrc", VOLUME),
+    "metaimage": (["vox-convert", "membrane:20,12,8:1"], "a.mha", VOLUME),
     "npy": (["vox-convert", "membrane:20,12,8:1"], "a.npy", VOLUME),
     "vdb": (["vox-convert", "sphere:16"], "a.vdb", VOLUME),
     "tiff": (["vox-convert", "membrane:20,12,2:1"], "s-%d.tif", VOLUME),
