@@ -1,5 +1,7 @@
 #include "formats/input_stream.h"
 
+#include <functional>
+
 #include "tests/formats/file_format_test.h"
 #include "tests/formats/packing_test.h"
 
@@ -93,10 +95,11 @@ TEST_F(InputStreamTest, WhatIsNoFileIsAnInputError) {
 
 struct Coding {
   const char* name;
-  std::string (*pack)(std::string);
+  std::function<std::string(const std::string&)> pack;
   std::unique_ptr<InputStream> (*unpack)(std::unique_ptr<InputStream>);
 };
-const Coding codings[] = {{"gzip", gzip_text, gunzip}, {"bzip2", bzip2_text, bunzip2}};
+const Coding codings[] = {
+    {"gzip", gzip_text, gunzip}, {"zlib", zlib_text, inflate}, {"bzip2", bzip2_text, bunzip2}};
 
 TEST_F(InputStreamTest, MembersAreJoinedAndPaddingIsAllowed) {
   for (const Coding& c : codings) {

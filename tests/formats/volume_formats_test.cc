@@ -80,7 +80,9 @@ TEST_F(VolumeFormatsTest, FilesHoldTheTypesThatTheTableSays) {
       const bool said = std::find(listed.begin(), listed.end(), text) != listed.end();
       const std::string name = path("v" + text + (format.images ? "-%d" : "") + ending);
       const auto found = holds(name, type, ctx_);
-      if (found) EXPECT_EQ(*found, said) << format.name << " " << text;
+      if (found) {
+        EXPECT_EQ(*found, said) << format.name << " " << text;
+      }
     }
   }
 }
