@@ -51,9 +51,9 @@ Result<std::unique_ptr<VolumeSource>> open_volume(const std::string& name, const
 /// True if `name` is a built-in such as "menger:5" (which need not be well-formed).
 bool is_builtin(const std::string& name);
 
-/// Starts a volume file of the kind that `name` ends in: .nrrd .nhdr .nii .nii.gz .mrc .mha .mhd .npy .raw
-/// .vdb, a printf pattern of images (a folder for slices), "-" (NRRD); "-.npy" is standard output in that
-/// format. Refuses what the kind cannot hold (ErrorCode::usage) before creating anything.
+/// Starts a volume file of the kind that `name` ends in: .nrrd .nhdr .nii .nii.gz .mrc .mha .mhd .vtk .vti
+/// .npy .raw .vdb, a printf pattern of images (a folder for slices), "-" (NRRD); "-.npy" is standard output
+/// in that format. Refuses what the kind cannot hold (ErrorCode::usage) before creating anything.
 Result<std::unique_ptr<VolumeSink>> create_volume(const std::string& name, const VolumeInfo& info, bool force,
                                                   Context& ctx);
 

@@ -250,6 +250,15 @@ Verdict read_meta_image(Input input) {
   return read_source([&](Context& ctx) { return open_meta_image(path, any_part(), ctx); });
 }
 
+Verdict read_vtk(Input input) {
+  const std::string path = put(input, "in.vtk");
+  return read_source([&](Context& ctx) { return open_vtk(path, any_part(), ctx); });
+}
+Verdict read_vti(Input input) {
+  const std::string path = put(input, "in.vti");
+  return read_source([&](Context& ctx) { return open_vti(path, any_part(), ctx); });
+}
+
 Verdict read_raw(Input input) {
   if (input.size() < 7) return {};
   const auto byte = [&](size_t i) { return std::to_integer<int64_t>(input[i]); };
@@ -335,6 +344,8 @@ const std::vector<Reader>& readers() {
       {"mrc", nullptr, read_mrc, mrc_seeds},
       {"npy", nullptr, read_npy, npy_seeds},
       {"meta_image", nullptr, read_meta_image, meta_image_seeds},
+      {"vtk", nullptr, read_vtk, vtk_seeds},
+      {"vti", nullptr, read_vti, vti_seeds},
       {"raw", nullptr, read_raw, raw_seeds},
       {"gunzip", nullptr, read_gunzip, gunzip_seeds},
       {"bunzip2", nullptr, read_bunzip2, bunzip2_seeds},

@@ -28,6 +28,8 @@ Verdict read_nifti(Input input);
 Verdict read_mrc(Input input);
 Verdict read_npy(Input input);
 Verdict read_meta_image(Input input);
+Verdict read_vtk(Input input);
+Verdict read_vti(Input input);
 /// The first 7 bytes are the options: x, y, z (two bytes each, little endian), type and byte order.
 Verdict read_raw(Input input);
 Verdict read_gunzip(Input input);

@@ -221,6 +221,42 @@ std::vector<std::string> meta_image_seeds() {
           "AnatomicalOrientation = ???\nElementDataFile = LOCAL\n1 2 3 4 5 6 7 8 9 10 11 12\n"};
 }
 
+std::vector<std::string> vtk_seeds() {
+  const std::string head = "# vtk DataFile Version 3.0\ntitle\n", points = "\nDATASET STRUCTURED_POINTS\n";
+  return {written("s.vtk", {4, 3, 2}, VoxelFormat::density16, SampleType::i16),
+          written("s.vtk", {4, 3, 2}, VoxelFormat::rgb24),
+          head + "ASCII" + points +
+              "DIMENSIONS 4 3 2\nORIGIN 1 2 3\nSPACING 1 2 .5\nCELL_DATA 6\n"
+              "SCALARS a float 1\nLOOKUP_TABLE default\n1 2 3\n4 5e3 nan\n",
+          head + "BINARY" + points +
+              "DIMENSIONS 3 1 2\nASPECT_RATIO 1 1 1\nMETADATA\nINFORMATION 0\n\n"
+              "POINT_DATA 6\nFIELD FieldData 1\na 2 6 double\n" +
+              pattern(96),
+          head + "BINARY" + points + "DIMENSIONS 3 1 2\nPOINT_DATA 6\nCOLOR_SCALARS c 4\n" + pattern(24)};
+}
+
+std::vector<std::string> vti_seeds() {
+  const auto image = [](const std::string& file, const std::string& data, const std::string& array,
+                        const std::string& appended) {
+    return "<VTKFile type=\"ImageData\" byte_order=\"LittleEndian\" " + file +
+           "><!-- -->\n<ImageData WholeExtent=\"0 3 1 3 0 1\" Origin=\"1 2 3\" Spacing='1 .5 2' "
+           "Direction=\"0 1 0 1 0 0 "
+           "0 0 1\"><Piece Extent=\"0 3 1 3 0 1\"><" +
+           data + "><DataArray type=\"UInt8\" Name=\"a\" NumberOfComponents=\"1\" " + array +
+           "</DataArray></" + data + "></Piece></ImageData>" + appended + "</VTKFile>";
+  };
+  const std::string zlib = "compressor=\"vtkZLibDataCompressor\"", packed = zlib_text(pattern(24));
+  const std::string counts =
+      le(uint32_t{1}) + le(uint32_t{24}) + le(uint32_t{0}) + le(static_cast<uint32_t>(packed.size()));
+  return {written("s.vti", {4, 3, 2}, VoxelFormat::density16, SampleType::i16),
+          written("s.vti", {4, 3, 2}, VoxelFormat::rgba32),
+          image("", "CellData", "format=\"ascii\">1 2 3 4 5 6", ""),
+          // 24 zeros behind their count.
+          image("", "PointData", "format=\"binary\"> GAAAA" + std::string(33, 'A') + "==", ""),
+          image(zlib, "PointData", "format=\"appended\" offset=\"0\">",
+                "<AppendedData encoding=\"raw\">_" + counts + packed)};
+}
+
 std::vector<std::string> raw_seeds() {
   const auto options = [](int type, int order) {
     return std::string("\3\0\2\0\4\0", 6) + static_cast<char>(2 * type + order);

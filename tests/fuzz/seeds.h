@@ -11,6 +11,8 @@ std::vector<std::string> nifti_seeds();
 std::vector<std::string> mrc_seeds();
 std::vector<std::string> npy_seeds();
 std::vector<std::string> meta_image_seeds();
+std::vector<std::string> vtk_seeds();
+std::vector<std::string> vti_seeds();
 std::vector<std::string> raw_seeds();
 std::vector<std::string> gunzip_seeds();
 std::vector<std::string> bunzip2_seeds();

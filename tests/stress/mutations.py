@@ -66,6 +66,8 @@ KINDS = {
     "gzip": (["vox-convert", "membrane:20,12,8:1"], "a.nii.gz", VOLUME),
     "mrc": (["vox-convert", "membrane:20,12,8:1"], "a.mrc", VOLUME),
     "metaimage": (["vox-convert", "membrane:20,12,8:1"], "a.mha", VOLUME),
+    "vtk": (["vox-convert", "membrane:20,12,8:1"], "a.vtk", VOLUME),
+    "vti": (["vox-convert", "membrane:20,12,8:1"], "a.vti", VOLUME),
     "npy": (["vox-convert", "membrane:20,12,8:1"], "a.npy", VOLUME),
     "vdb": (["vox-convert", "sphere:16"], "a.vdb", VOLUME),
     "tiff": (["vox-convert", "membrane:20,12,2:1"], "s-%d.tif", VOLUME),
