@@ -112,6 +112,10 @@ Result<Scene> open_scene(const std::string& name, const SceneOptions& o, Run& ru
   if (input.svmm) {
     scene.compressed.emplace(input.svmm);
   } else if (input.color) {
+    if (o.level_of_detail && input.color->params().colors != color::Colors::all)
+      run.say(name +
+              ": --lod on: voxels alone have colors: all of them are drawn (dagcolor-pack --colors all "
+              "gives coarser ones theirs)");
     scene.dag.emplace(input.color);
   } else if (input.packed && !o.backend && !o.level_of_detail && render::MaskGrid::fits(*input.packed)) {
     run.stage("read");

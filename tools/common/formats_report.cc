@@ -47,10 +47,10 @@ Json list(std::span<const std::string_view> words) {
 std::string formats_text() {
   std::string text;
   for (const Row& row : rows()) {
-    text += fmt::format("{:<8}reads {}\n", row.name, fmt::join(row.reads, " "));
-    text += row.writes.empty() ? "        writes nothing\n"
-                               : fmt::format("        writes {}\n", fmt::join(row.writes, " "));
-    text += fmt::format("        types {}; levels: {}; random access: {}\n", row.types,
+    text += fmt::format("{:<10} reads {}\n", row.name, fmt::join(row.reads, " "));
+    text += row.writes.empty() ? "           writes nothing\n"
+                               : fmt::format("           writes {}\n", fmt::join(row.writes, " "));
+    text += fmt::format("           types {}; levels: {}; random access: {}\n", row.types,
                         row.levels ? "yes" : "no", row.random_access);
   }
   return text;
