@@ -35,7 +35,7 @@ struct Document {
   std::string name;  ///< of the file, for messages
   bool big_endian = false;
   int length_bytes = 4;  ///< of the counts before data
-  bool compressed = false;
+  Packing packing = Packing::none;
   Box extent;  ///< of points
   Affine affine;
   std::vector<Array> arrays;

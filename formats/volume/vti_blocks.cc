@@ -1,6 +1,7 @@
 #include "formats/volume/vti_blocks.h"
 
 #include <fmt/format.h>
+#include <lz4.h>
 #include <zlib.h>
 
 #include <algorithm>
@@ -39,6 +40,21 @@ class BlockSource final : public VolumeSource {
   SampleLayout layout_;
 };
 
+/// Whether `packed` is, unpacked, exactly as long as `out`, which it fills then.
+bool unpack(Packing packing, std::span<const std::byte> packed, std::span<std::byte> out) {
+  if (packing == Packing::lz4) {  // whose sizes are ints, as blocks are
+    if (packed.size() > LZ4_MAX_INPUT_SIZE) return false;
+    const int count = ::LZ4_decompress_safe(reinterpret_cast<const char*>(packed.data()),
+                                            reinterpret_cast<char*>(out.data()),
+                                            static_cast<int>(packed.size()), static_cast<int>(out.size()));
+    return count >= 0 && static_cast<size_t>(count) == out.size();
+  }
+  uLongf count = out.size();
+  const int code = ::uncompress(reinterpret_cast<Bytef*>(out.data()), &count,
+                                reinterpret_cast<const Bytef*>(packed.data()), packed.size());
+  return code == Z_OK && count == out.size();
+}
+
 class BlockStream final : public InputStream {
  public:
   BlockStream(std::shared_ptr<BlockFile> blocks, const std::string& name, uint64_t bytes)
@@ -72,13 +88,10 @@ Result<std::shared_ptr<const std::vector<std::byte>>> BlockFile::get(uint64_t in
   const uint64_t first = offsets_[index], expected = std::min(block_, bytes_ - index * block_);
   const auto packed = file_->bytes().subspan(first, offsets_[index + 1] - first);
   auto bytes = std::make_shared<std::vector<std::byte>>(static_cast<size_t>(expected));
-  uLongf count = expected;
-  const int code = ::uncompress(reinterpret_cast<Bytef*>(bytes->data()), &count,
-                                reinterpret_cast<const Bytef*>(packed.data()), packed.size());
-  if (code != Z_OK || count != expected)
+  if (!unpack(packing_, packed, *bytes))
     return bad_input(file_->name(),
-                     fmt::format("block {} of voxel data at byte {}: corrupt zlib data: expected {} bytes",
-                                 index, first, expected));
+                     fmt::format("block {} of voxel data at byte {}: corrupt data: expected {} bytes", index,
+                                 first, expected));
   const std::lock_guard lock(mutex_);
   recent_.push_front({index, bytes});
   if (recent_.size() > kept_) recent_.pop_back();

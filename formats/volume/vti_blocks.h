@@ -1,4 +1,4 @@
-// Blocks of bytes that zlib has packed one by one, in a mapped file: any of them is unpacked alone.
+// Blocks of bytes that were packed one by one, in a mapped file: any of them is unpacked alone.
 #pragma once
 
 #include <cstdint>
@@ -17,14 +17,18 @@
 
 namespace voxkit::vti {
 
+/// What packed the blocks.
+enum class Packing { none, zlib, lz4 };
+
 /// All blocks but the last have as many bytes; those unpacked most recently are kept.
 class BlockFile {
  public:
   /// `offsets`: of each block in the file and, at last, of their end, ascending and within it. `memory` holds
   /// what they take, and `kept` blocks.
-  BlockFile(std::shared_ptr<const MappedFile> file, std::vector<uint64_t> offsets, uint64_t block,
-            uint64_t bytes, size_t kept, Reservation memory)
+  BlockFile(std::shared_ptr<const MappedFile> file, Packing packing, std::vector<uint64_t> offsets,
+            uint64_t block, uint64_t bytes, size_t kept, Reservation memory)
       : file_(std::move(file)),
+        packing_(packing),
         offsets_(std::move(offsets)),
         block_(block),
         bytes_(bytes),
@@ -41,6 +45,7 @@ class BlockFile {
   Result<std::shared_ptr<const std::vector<std::byte>>> get(uint64_t index);
 
   std::shared_ptr<const MappedFile> file_;
+  Packing packing_;
   std::vector<uint64_t> offsets_;
   uint64_t block_, bytes_;
   size_t kept_;

@@ -1,4 +1,4 @@
-// The bytes of arrays in VTK's XML files: as they are, base64, blocks of zlib, text.
+// The bytes of arrays in VTK's XML files: as they are, base64, blocks, text.
 #include <fmt/format.h>
 
 #include <algorithm>
@@ -151,7 +151,7 @@ Result<Blocks> read_blocks(InputStream& stream, const Document& document, uint64
     const uint64_t end = blocks.offsets.back() + size;
     if (size > file_bytes || end > file_bytes)
       return wrong(fmt::format("blocks packed in at most {} bytes, not {} and more", file_bytes, size));
-    // zlib packs to a 1032nd at best.
+    // zlib packs to a 1032nd at best, LZ4 to a 255th.
     if ((i + 1 < count || last == 0 ? block : last) / 1100 > size)
       return wrong(fmt::format("no block that is packed to {} bytes", size));
     blocks.offsets.push_back(end);
@@ -177,7 +177,7 @@ Result<Data> open_data(std::shared_ptr<const MappedFile> file, const Document& d
   VOX_CHECK(stream->skip(start));
   const bool base64 = array.appended ? document.appended_base64 : true;
   if (base64) stream = std::make_unique<Base64Stream>(std::move(stream));
-  if (document.compressed) {
+  if (document.packing != Packing::none) {
     VOX_TRY(Blocks blocks, read_blocks(*stream, document, bytes, size, ctx));
     uint64_t first = stream->position();
     if (base64) {  // blocks are looked up in the bytes that it stands for
@@ -190,8 +190,8 @@ Result<Data> open_data(std::shared_ptr<const MappedFile> file, const Document& d
                                                   there, blocks.offsets.back()));
     for (uint64_t& offset : blocks.offsets) offset += first;
     return Data{nullptr,
-                std::make_shared<BlockFile>(std::move(file), std::move(blocks.offsets), blocks.block, bytes,
-                                            blocks.kept, std::move(blocks.memory)),
+                std::make_shared<BlockFile>(std::move(file), document.packing, std::move(blocks.offsets),
+                                            blocks.block, bytes, blocks.kept, std::move(blocks.memory)),
                 {}};
   }
   VOX_TRY(const uint64_t found, read_count(*stream, document));

@@ -150,12 +150,13 @@ class Parser {
     if (!header.empty() && header != "UInt32" && header != "UInt64")
       return wrong(at, "header_type=\"UInt32\" or \"UInt64\"");
     document_.length_bytes = header == "UInt64" ? 8 : 4;
-    if (!compressor.empty() && compressor != "vtkZLibDataCompressor")
-      return bad_input(
-          document_.name,
-          fmt::format("data compressed by \"{}\" are unsupported: expected vtkZLibDataCompressor",
-                      text_field(compressor.substr(0, 40))));
-    document_.compressed = !compressor.empty();
+    document_.packing = compressor == "vtkZLibDataCompressor"  ? Packing::zlib
+                        : compressor == "vtkLZ4DataCompressor" ? Packing::lz4
+                                                               : Packing::none;
+    if (!compressor.empty() && document_.packing == Packing::none)
+      return bad_input(document_.name, fmt::format("data compressed by \"{}\" are unsupported: expected "
+                                                   "vtkZLibDataCompressor or vtkLZ4DataCompressor",
+                                                   text_field(compressor.substr(0, 40))));
     return {};
   }
 

@@ -107,6 +107,29 @@ TEST_F(VtiTest, EveryCodingInBothOrders) {
     }
 }
 
+TEST_F(VtiTest, BlocksOfLz4) {
+  // Two bytes as they are; and "abcabcabcabcabcabc": three, 10 from 3 before, and the last five as they are.
+  const auto file = [&](const std::string& extent, uint32_t bytes, const std::string& block) {
+    return document(
+        little + " compressor=\"vtkLZ4DataCompressor\"", extent, "",
+        array("UInt8", "binary",
+              base64(sample_text<uint32_t>({1, bytes, 0, static_cast<uint32_t>(block.size())}, false)) +
+                  base64(block)));
+  };
+  expect_voxels(file("0 1 0 0 0 0", 2,
+                     "\x20"
+                     "ab"),
+                "ab");
+  const std::string run = std::string(
+                              "\x36"
+                              "abc\3\0\x50",
+                              7) +
+                          "bcabc";
+  expect_voxels(file("0 17 0 0 0 0", 18, run), "abcabcabcabcabcabc");
+  refused(file("0 17 0 0 0 0", 18, run.substr(0, 11)), "corrupt data: expected 18 bytes");
+  refused(file("0 18 0 0 0 0", 19, run), "corrupt data: expected 19 bytes");
+}
+
 TEST_F(VtiTest, AnyBoxOfBlocks) {
   // 7 x 5 x 4 voxels of 16 bits in blocks of 36 bytes, whatever rows are.
   std::vector<uint16_t> values(140);
@@ -188,7 +211,8 @@ TEST_F(VtiTest, WhatIsRefused) {
   refused(file("<PointData></PointData>"), "expected a DataArray of points or cells");
   refused(document(little, "1 0 0 0 0 0", "", ""), "expected an extent of six whole numbers");
   refused(document(little + " compressor=\"vtkLZMADataCompressor\"", "0 1 0 0 0 0", "", ""),
-          "data compressed by \"vtkLZMADataCompressor\" are unsupported: expected vtkZLibDataCompressor");
+          "data compressed by \"vtkLZMADataCompressor\" are unsupported: expected vtkZLibDataCompressor or "
+          "vtkLZ4");
   std::string pieces = file(array("UInt8", "ascii", "7 8"));
   pieces.replace(pieces.find("<Piece Extent=\"0 1"), 18, "<Piece Extent=\"0 0");
   refused(pieces, "expected one piece of the WholeExtent");
@@ -202,7 +226,7 @@ TEST_F(VtiTest, WhatIsRefused) {
   expect_voxels(blocks(1, 2, 0, size), "ab");
   refused(blocks(1, 3, 0, size), "expected 2 bytes in all");
   refused(blocks(0xffffffff, 2, 0, size), "of which the file has the sizes");
-  refused(blocks(1, 2, 0, size - 1), "corrupt zlib data");
+  refused(blocks(1, 2, 0, size - 1), "block 0 of voxel data at byte 0: corrupt data: expected 2 bytes");
   refused(blocks(1, 2, 0, 0xffffffff), "not 4294967295");
 }
 

@@ -254,7 +254,11 @@ std::vector<std::string> vti_seeds() {
           // 24 zeros behind their count.
           image("", "PointData", "format=\"binary\"> GAAAA" + std::string(33, 'A') + "==", ""),
           image(zlib, "PointData", "format=\"appended\" offset=\"0\">",
-                "<AppendedData encoding=\"raw\">_" + counts + packed)};
+                "<AppendedData encoding=\"raw\">_" + counts + packed),
+          // 24 bytes as they are.
+          image("compressor=\"vtkLZ4DataCompressor\"", "PointData", "format=\"appended\" offset=\"0\">",
+                "<AppendedData encoding=\"raw\">_" + le(uint32_t{1}) + le(uint32_t{24}) + le(uint32_t{0}) +
+                    le(uint32_t{26}) + "\xf0\x09" + pattern(24))};
 }
 
 std::vector<std::string> raw_seeds() {
