@@ -125,6 +125,8 @@ class UnpackStream : public InputStream {
   virtual bool has_more() const { return false; }
 
   void member_end() { between_members_ = true; }
+  /// Nothing follows.
+  void data_end() { ended_ = true; }
   /// Says so, and keeps saying so: the library's state is not to be used again.
   tl::unexpected<Error> corrupt(const std::string& why) {
     broken_ = Error{ErrorCode::input, name_,
@@ -196,7 +198,10 @@ class InflateStream final : public UnpackStream {
     if (code < 0 || code == ISAL_NEED_DICT) return corrupt(reason(code));
     if (state_.block_state == ISAL_BLOCK_FINISH) {
       full_ = false;
-      member_end();
+      if (state_.crc_flag == ISAL_GZIP)
+        member_end();
+      else
+        data_end();  // ISA-L may have taken bytes behind them
     }
     return out.size() - state_.avail_out;
   }

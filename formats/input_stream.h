@@ -42,7 +42,8 @@ Result<std::unique_ptr<InputStream>> open_stream(const std::string& path);
 /// Decompress on the fly; concatenated members are followed, trailing zeros allowed. The memory used does not
 /// depend on the data.
 std::unique_ptr<InputStream> gunzip(std::unique_ptr<InputStream> packed);
-/// The same of zlib data, which gzip may be around as well.
+/// The same of zlib data, of which there is one member, and what is behind it is not looked at; or of gzip
+/// data.
 std::unique_ptr<InputStream> inflate(std::unique_ptr<InputStream> packed);
 std::unique_ptr<InputStream> bunzip2(std::unique_ptr<InputStream> packed);
 /// Gives back bytes that were read ahead (to recognise a format) in front of the rest.

@@ -100,6 +100,9 @@ struct Coding {
 };
 const Coding codings[] = {
     {"gzip", gzip_text, gunzip}, {"zlib", zlib_text, inflate}, {"bzip2", bzip2_text, bunzip2}};
+bool has_members(const Coding& coding) {
+  return std::string(coding.name) != "zlib";
+}
 
 TEST_F(InputStreamTest, MembersAreJoinedAndPaddingIsAllowed) {
   for (const Coding& c : codings) {
@@ -108,6 +111,7 @@ TEST_F(InputStreamTest, MembersAreJoinedAndPaddingIsAllowed) {
       const std::string text = random_text(size, 9);
       for (size_t piece : {1000, 5000000}) {
         EXPECT_EQ(*drain(*c.unpack(open(c.pack(text))), piece), text);
+        if (!has_members(c)) continue;
         const std::string two = c.pack(text) + c.pack("second") + std::string(512, '\0');
         EXPECT_EQ(*drain(*c.unpack(open(two)), piece), text + "second");
       }
@@ -139,10 +143,20 @@ TEST_F(InputStreamTest, CutAndCorruptDataAreOneClearError) {
         EXPECT_FALSE(drain(*stream, 64)) << "an error must stay one";
       }
     }
+    if (!has_members(c)) continue;
     const auto garbage = drain(*c.unpack(open(packed + "garbage")), 1000);
     ASSERT_FALSE(garbage);
     EXPECT_NE(garbage.error().what.find("corrupt"), std::string::npos) << garbage.error().what;
     EXPECT_FALSE(drain(*c.unpack(open(packed + std::string(3, '\0') + packed)), 1000));
+  }
+}
+
+TEST_F(InputStreamTest, ZlibDataMayBeGzipDataAndEndWhereTheyEnd) {
+  const std::string text = random_text(5000, 9);
+  for (const size_t piece : {1, 1000, 100000}) {
+    EXPECT_EQ(*drain(*inflate(open(gzip_text(text) + gzip_text("second"))), piece), text + "second");
+    EXPECT_EQ(*drain(*inflate(open(zlib_text(text) + "behind")), piece), text);
+    EXPECT_EQ(*drain(*inflate(open(zlib_text("") + "behind")), piece), "");
   }
 }
 
