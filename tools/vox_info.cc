@@ -7,6 +7,7 @@
 #include "formats/volume/open_volume.h"
 #include "formats/volume/readers.h"
 #include "formats/volume/volume_formats.h"
+#include "libsvmm/packed/needed_ranges.h"
 #include "tools/common/attributes.h"
 #include "tools/common/color_report.h"
 #include "tools/common/formats_report.h"
@@ -22,7 +23,9 @@ namespace {
 struct Options {
   std::string file;
   OpenOptions open;
-  bool check = false, formats = false;
+  bool check = false, formats = false, ranges = false;
+  std::optional<Box> roi;
+  std::optional<int64_t> level;
 };
 
 void declare(CommandLine& line, Options& o) {
@@ -30,6 +33,13 @@ void declare(CommandLine& line, Options& o) {
   line.flag("--formats", "List the formats of volumes, and what files of each hold, instead", o.formats);
   line.flag("--check", "Verify every checksum and the whole structure; exit 1 if something is wrong",
             o.check);
+  line.flag("--ranges",
+            "List the bytes of a packed .svmm that a view needs, in the order to fetch them, instead",
+            o.ranges);
+  line.option("--roi", "BOX", "Of --ranges: X0,Y0,Z0,X1,Y1,Z1, half open, in voxels of level 0 (all)",
+              box(o.roi));
+  line.option("--level", "L", "Of --ranges: the finest level that is seen (0)",
+              integer(o.level, 0, svmm::max_packed_levels - 1));
   declare_input_options(line, o.open);
 }
 
@@ -224,6 +234,47 @@ class NullSink : public VolumeSink {
   Status finish() override { return {}; }
 };
 
+/// The bytes that a view needs, with their sum.
+Result<int> list_ranges(const Options& o, const Input& input, Run& run) {
+  if (!input.packed) return bad_usage("--ranges: expected a .svmm file of layout packed");
+  const svmm::PackedVolume& volume = *input.packed;
+  const int64_t level = o.level.value_or(volume.finest());
+  if (level < volume.finest() || level >= volume.params().levels)
+    return bad_usage(fmt::format("--level: {}: expected {} to {}, which the file has", level, volume.finest(),
+                                 volume.params().levels - 1));
+  const Index3 dims = volume.levels()[0].dims;
+  const Box whole{Index3{0}, dims}, view = o.roi.value_or(whole);
+  if (!whole.contains(view) || view.empty())
+    return bad_usage(
+        fmt::format("--roi: the box is not inside the volume: expected one inside 0,0,0,{},{},{}", dims.x,
+                    dims.y, dims.z));
+  Json json = Json::array();
+  std::string text = "part       from byte         bytes\n";
+  uint64_t total = 0;
+  for (const svmm::NeededRange& range : svmm::needed_ranges(volume, view, static_cast<int>(level))) {
+    const uint64_t bytes = range.end - range.begin;
+    total += bytes;
+    const bool index = range.level == svmm::NeededRange::index;
+    const std::string part = index ? "index" : fmt::format("level {}", range.level);
+    text += fmt::format("{:<8}  {:>10}  {:>12}\n", part, range.begin, bytes);
+    Json row = Json::object();
+    row.set("part", part).set("offset", range.begin).set("bytes", bytes);
+    json.push(std::move(row));
+  }
+  const uint64_t of = volume.container().file_bytes();
+  text += fmt::format("total     {} of {} bytes, {:.3g} %\n", total, of,
+                      100. * static_cast<double>(total) / static_cast<double>(of));
+  if (run.options.json) {
+    Json all = Json::result();
+    all.set("tool", run.tool).set("version", version_text()).set("input", o.file);
+    all.set("ranges", std::move(json)).set("bytes", total).set("file_bytes", of);
+    VOX_CHECK(print(all.text()));
+  } else if (!run.options.quiet) {
+    VOX_CHECK(print(text));
+  }
+  return 0;
+}
+
 Result<int> work(const Options& o, Run& run) {
   if (o.formats) {
     if (!o.file.empty()) return bad_usage("--formats: is of no file: leave FILE out");
@@ -233,7 +284,10 @@ Result<int> work(const Options& o, Run& run) {
   if (o.file.empty()) return bad_usage("FILE is required: see --help");
   OpenOptions open = o.open;
   open.any_part = true;
+  if (!o.ranges && (o.roi || o.level)) return bad_usage("--roi, --level: of --ranges only");
+  if (o.ranges && o.check) return bad_usage("--ranges and --check: expected one of them");
   VOX_TRY(const Input input, open_input(o.file, open, run.ctx));
+  if (o.ranges) return list_ranges(o, input, run);
   if (o.check) {
     run.stage("check");
     NullSink sink;
