@@ -232,8 +232,7 @@ Status copy_volume(VolumeSource& source, const Box& box, VolumeSink& sink, Conte
   return {};
 }
 
-Status visit_voxels(VolumeSource& source, const std::function<void(ConstVoxelSpan, Index3)>& visit,
-                    Context& ctx) {
+Status visit_voxels(VolumeSource& source, const VisitVoxels& visit, Context& ctx) {
   const VoxelFormat format = source.info().format;
   const Box box = source.info().box();
   const Slabs slabs(box, voxel_bytes(format), slab_target(ctx));
@@ -241,8 +240,8 @@ Status visit_voxels(VolumeSource& source, const std::function<void(ConstVoxelSpa
   if (source.forward_only()) {
     VOX_TRY(buffer, Buffer::allocate(slabs.bytes(), "a slab of voxels", ctx));
   }
-  const auto visit_one = [&](const Voxel& value) {
-    visit(packed(value.bytes.data(), Index3(1), format), Index3(1));
+  const auto visit_one = [&](const Voxel& value, const Box& of) {
+    visit(packed(value.bytes.data(), Index3(1), format), Index3(1), of.voxels());
   };
   for (int64_t i = 0; i < slabs.count(); ++i) {
     VOX_CHECK(check_interrupt());
@@ -252,7 +251,7 @@ Status visit_voxels(VolumeSource& source, const std::function<void(ConstVoxelSpa
       whole = packed(buffer->data(), slab.size(), format);
       VOX_CHECK(source.read(slab, whole));
     } else if (const auto value = source.uniform(slab)) {
-      visit_one(*value);
+      visit_one(*value, slab);
       continue;
     }
     source.expect(slab.lo.z, slab.hi.z);
@@ -261,19 +260,19 @@ Status visit_voxels(VolumeSource& source, const std::function<void(ConstVoxelSpa
       if (buffer) {
         const Index3 at = tile.lo - slab.lo;
         visit({whole.row(at.y, at.z) + at.x * voxel_bytes(format), whole.row_stride, whole.slice_stride},
-              tile.size());
+              tile.size(), 1);
         return {};
       }
       const auto known = [&](const Box& b) {
         const auto value = source.uniform(b);
-        if (value) visit_one(*value);
+        if (value) visit_one(*value, b);
         return value.has_value();
       };
       std::unique_ptr<std::byte[]> voxels;
       const auto read = [&](const Box& b) -> Status {
         if (!voxels) voxels.reset(new std::byte[static_cast<size_t>(tile.voxels() * voxel_bytes(format))]);
         VOX_CHECK(source.read(b, packed(voxels.get(), b.size(), format)));
-        visit(packed(static_cast<const std::byte*>(voxels.get()), b.size(), format), b.size());
+        visit(packed(static_cast<const std::byte*>(voxels.get()), b.size(), format), b.size(), 1);
         return {};
       };
       return walk_tile(tile, known, read);
@@ -292,7 +291,7 @@ Result<ValueRange> measure_range(VolumeSource& source, Context& ctx) {
   std::mutex mutex;
   VOX_CHECK(visit_voxels(
       source,
-      [&](ConstVoxelSpan voxels, Index3 size) {
+      [&](ConstVoxelSpan voxels, Index3 size, int64_t) {
         Extremes part;
         part.add(voxels, size, format, info.fill);
         std::lock_guard lock(mutex);

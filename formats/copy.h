@@ -69,9 +69,10 @@ Status read_slab(VolumeSource& source, const Box& slab, VoxelSpan out, Context& 
 Status copy_volume(VolumeSource& source, const Box& box, VolumeSink& sink, Context& ctx);
 
 /// Calls `visit` with all voxels, in parts of any shape, from any of ctx.threads threads; of a part that is
-/// known to have one value, with one voxel. A forward-only source is used up.
-Status visit_voxels(VolumeSource& source,
-                    const std::function<void(ConstVoxelSpan voxels, Index3 size)>& visit, Context& ctx);
+/// known to have one value, with one voxel, which stands for `times` of them. A forward-only source is used
+/// up.
+using VisitVoxels = std::function<void(ConstVoxelSpan voxels, Index3 size, int64_t times)>;
+Status visit_voxels(VolumeSource& source, const VisitVoxels& visit, Context& ctx);
 
 /// The least and greatest stored value of a scalar volume; its fill value, NaN and infinities are not
 /// counted, and a volume of nothing else has the range 0..0. A forward-only source is used up.

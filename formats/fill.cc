@@ -136,7 +136,7 @@ Result<Census> take_census(VolumeSource& source, Context& ctx) {
   std::mutex mutex;
   VOX_CHECK(visit_voxels(
       source,
-      [&](ConstVoxelSpan voxels, Index3 size) {
+      [&](ConstVoxelSpan voxels, Index3 size, int64_t) {
         Ends ends;
         for (int64_t z = 0; z < size.z; ++z)
           for (int64_t y = 0; y < size.y; ++y) {

@@ -14,6 +14,7 @@
 #include "tools/common/input.h"
 #include "tools/common/json.h"
 #include "tools/common/main.h"
+#include "tools/common/stats_report.h"
 #include "tools/common/svmm_report.h"
 #include "tools/common/vq_report.h"
 
@@ -23,7 +24,7 @@ namespace {
 struct Options {
   std::string file;
   OpenOptions open;
-  bool check = false, formats = false, ranges = false;
+  bool check = false, formats = false, ranges = false, stats = false;
   std::optional<Box> roi;
   std::optional<int64_t> level;
 };
@@ -33,6 +34,9 @@ void declare(CommandLine& line, Options& o) {
   line.flag("--formats", "List the formats of volumes, and what files of each hold, instead", o.formats);
   line.flag("--check", "Verify every checksum and the whole structure; exit 1 if something is wrong",
             o.check);
+  line.flag("--stats",
+            "Read all voxels, too: extremes, mean, deviation, percentiles, entropy, histogram, share of void",
+            o.stats);
   line.flag("--ranges",
             "List the bytes of a packed .svmm that a view needs, in the order to fetch them, instead",
             o.ranges);
@@ -234,6 +238,17 @@ class NullSink : public VolumeSink {
   Status finish() override { return {}; }
 };
 
+/// Floats are read twice: their range comes first.
+Result<VolumeStats> stats_of(const Options& o, const OpenOptions& open, const Input& input, Run& run) {
+  run.stage("stats");
+  if (input.source->info().format != VoxelFormat::float32) return volume_stats(*input.source, {}, run.ctx);
+  if (o.file == "-")
+    return bad_usage("--stats: the floats of a stream cannot be looked at twice: name a file");
+  VOX_TRY(const Input again, open_input(o.file, open, run.ctx));
+  VOX_TRY(const ValueRange range, measure_range(*again.source, run.ctx));
+  return volume_stats(*input.source, range, run.ctx);
+}
+
 /// The bytes that a view needs, with their sum.
 Result<int> list_ranges(const Options& o, const Input& input, Run& run) {
   if (!input.packed) return bad_usage("--ranges: expected a .svmm file of layout packed");
@@ -285,7 +300,8 @@ Result<int> work(const Options& o, Run& run) {
   OpenOptions open = o.open;
   open.any_part = true;
   if (!o.ranges && (o.roi || o.level)) return bad_usage("--roi, --level: of --ranges only");
-  if (o.ranges && o.check) return bad_usage("--ranges and --check: expected one of them");
+  if (o.ranges && (o.check || o.stats))
+    return bad_usage("--ranges and --check or --stats: expected one of them");
   VOX_TRY(const Input input, open_input(o.file, open, run.ctx));
   if (o.ranges) return list_ranges(o, input, run);
   if (o.check) {
@@ -304,13 +320,19 @@ Result<int> work(const Options& o, Run& run) {
     }
     VOX_CHECK(status);
   }
+  std::optional<VolumeStats> stats;
+  if (o.stats) {
+    VOX_TRY(stats, stats_of(o, open, input, run));
+  }
   const Container* container = container_of(input);
   const auto bytes =
       container ? std::optional(container->file_bytes()) : bytes_of(input.source->info(), o.file);
   if (run.options.json) {
-    VOX_CHECK(print(json_of(o, run, input, bytes).text()));
+    Json json = json_of(o, run, input, bytes);
+    if (stats) json.set("stats", stats_json(*stats));
+    VOX_CHECK(print(json.text()));
   } else if (!run.options.quiet) {
-    VOX_CHECK(print(text_of(o, input, bytes)));
+    VOX_CHECK(print(text_of(o, input, bytes) + (stats ? stats_text(*stats) : "")));
   }
   return 0;
 }
@@ -326,6 +348,7 @@ int main(int argc, char** argv) {
       "  vox-info head.nii.gz\n"
       "  vox-info head.svmm --json\n"
       "  vox-info head.vqv --check\n"
+      "  vox-info head.nii.gz --stats\n"
       "  vox-info --formats\n",
       [&](CommandLine& line) { declare(line, options); }, [&](Run& run) { return work(options, run); });
 }

@@ -205,7 +205,8 @@ class Encoder {
   Status prepare() {
     const auto look = [&](ConstVoxelSpan voxels, Index3 size) { survey_.look(voxels, size); };
     if (params_.levels == 1) {
-      VOX_CHECK(visit_voxels(source_, look, ctx_));
+      VOX_CHECK(visit_voxels(
+          source_, [&](ConstVoxelSpan voxels, Index3 size, int64_t) { look(voxels, size); }, ctx_));
     } else {
       for (int level = 1; level < params_.levels; ++level) {
         const auto visit = level == 1 ? std::function<void(ConstVoxelSpan, Index3)>(look) : nullptr;

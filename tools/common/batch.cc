@@ -93,14 +93,27 @@ Json json_of(const Job& job, const Run& run) {
   return json;
 }
 
-/// The folder of an output is made where it is not there yet.
-Status make_folder(const Job& job) {
-  const fs::path folder = fs::path(job.output).parent_path();
-  std::error_code error;
-  if (!folder.empty()) fs::create_directories(folder, error);
-  if (error) return fail(ErrorCode::output, folder.string(), error.message());
-  return {};
-}
+/// The folder of an output, made where it is not there yet; gone again if nothing comes into it.
+class OutputFolder {
+ public:
+  Status make(const Job& job) {
+    const fs::path folder = fs::path(job.output).parent_path();
+    std::error_code error;
+    for (fs::path at = folder; !at.empty() && !fs::exists(at, error); at = at.parent_path())
+      made_.push_back(at);
+    if (!folder.empty()) fs::create_directories(folder, error);
+    if (error) return fail(ErrorCode::output, folder.string(), error.message());
+    return {};
+  }
+  void remove_empty() {
+    std::error_code error;
+    for (const fs::path& folder : made_)
+      if (!fs::remove(folder, error)) return;
+  }
+
+ private:
+  std::vector<fs::path> made_;  ///< the innermost first
+};
 
 }  // namespace
 
@@ -171,8 +184,9 @@ Result<int> run_batch(const Batch& batch, const BatchKind& kind, Run& run,
     }
     Run own(run.tool, run.options);
     own.json_lines = true;
+    OutputFolder folder;
     const Result<int> done = guarded([&]() -> Result<int> {
-      VOX_CHECK(make_folder(job));
+      VOX_CHECK(folder.make(job));
       return encode(job, own);
     });
     if (done && *done == 0) {
@@ -180,6 +194,7 @@ Result<int> run_batch(const Batch& batch, const BatchKind& kind, Run& run,
       continue;
     }
     ++failed;
+    folder.remove_empty();
     const int code = done ? *done : exit_code(done.error());
     const bool stopped = !done && done.error().code == ErrorCode::interrupted;
     if (!done && !stopped && run.options.json) {
