@@ -21,6 +21,8 @@ constexpr double most_step = 0x1p40;  // floats are summed as whole parts of the
 /// Floats of one value, counted while there are few.
 class Different {
  public:
+  static constexpr uint64_t most_bytes = most_different * uint64_t{48};  ///< nodes of a table, and the table
+
   void add(float value, uint64_t times) {
     if (!few_) return;
     uint32_t bits;
@@ -289,9 +291,9 @@ Result<VolumeStats> volume_stats(VolumeSource& source, const ValueRange& range, 
   const bool floats = format == VoxelFormat::float32, colors = is_color(format);
   const size_t channels = colors ? static_cast<size_t>(voxel_bytes(format)) : 1;
   const size_t bins = floats || format == VoxelFormat::density16 ? fine_bins : 256;
+  const uint64_t tally_bytes = channels * bins * sizeof(uint64_t) + (floats ? Different::most_bytes : 0);
   VOX_TRY(const Reservation memory,
-          Reservation::take(static_cast<uint64_t>(ctx.threads + 1) * channels * bins * sizeof(uint64_t),
-                            "counts of values", ctx));
+          Reservation::take(static_cast<uint64_t>(ctx.threads + 1) * tally_bytes, "counts of values", ctx));
   const FloatScale scale(range);
   Tallies tallies(channels, bins);
   VOX_CHECK(visit_voxels(

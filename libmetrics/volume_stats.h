@@ -43,7 +43,7 @@ struct VolumeStats {
 
 /// Reads all voxels once; boxes that are known to be uniform are not read. `range`: of FLOAT32, as from
 /// measure_range; of others unused. Counts are whole numbers and sums are of them, so the result is the same
-/// for any number of threads. Memory: up to 2 MiB a thread. A forward-only source is used up. Errors: those
+/// for any number of threads. Memory: up to 4 MiB a thread. A forward-only source is used up. Errors: those
 /// of the source; ErrorCode::limit.
 Result<VolumeStats> volume_stats(VolumeSource& source, const ValueRange& range, Context& ctx);
 

@@ -39,13 +39,13 @@ struct Options {
 };
 
 void declare(CommandLine& line, Options& o) {
-  line.arguments(
-      "INPUT",
+  declare_batch(
+      line,
       "Mesh (.obj .gltf .glb .ply .stl .3ds), points (.ply .pcd .las), model (.vox), RGBA or RGB "
       "volume, built-in "
       "(menger:5, terrain:N, terrain:N:box), or .dagc file. Several meshes or points become one surface: "
       "what shares a voxel has their mean, as in one file",
-      o.batch.inputs);
+      ".dagc", o.batch);
   line.behind_arguments(
       "--at", "X,Y,Z",
       "Of the mesh or points named before it: moved by so much, in the unit of the file (0,0,0)",
@@ -54,11 +54,6 @@ void declare(CommandLine& line, Options& o) {
         o.places[number] = {at[0], at[1], at[2]};
         return {};
       });
-  line.file("-o,--output", "OUT",
-            "Output (.dagc), or -; a surface for each input: a folder that exists or ends with /, or a name "
-            "with {stem}",
-            o.batch.output, true);
-  declare_batch(line, o.batch);
   line.option(
       "--resolution", "N",
       "Of a mesh or points: voxels along the longest side (1024; of what vox-decode wrote, its own grid). "

@@ -46,13 +46,8 @@ struct Options {
 };
 
 void declare(CommandLine& line, Options& o) {
-  line.arguments("INPUT", "Volume file, folder or pattern of images, built-in such as menger:5, or -",
-                 o.batch.inputs);
-  line.file(
-      "-o,--output", "OUT",
-      "Output (.svmm), or -; of several inputs a folder that exists or ends with /, or a name with {stem}",
-      o.batch.output, true);
-  declare_batch(line, o.batch);
+  declare_batch(line, "Volume file, folder or pattern of images, built-in such as menger:5, or -", ".svmm",
+                o.batch);
   line.option("-w,--blockwidth", "W[,W...]",
               "Block widths, powers of two, base level first, the last for all levels above; 0: stepped 2, "
               "4, 8 ... (0)",

@@ -238,15 +238,21 @@ class NullSink : public VolumeSink {
   Status finish() override { return {}; }
 };
 
-/// Floats are read twice: their range comes first.
+/// Floats are read twice: their range comes first. What --check has read front to back is opened again.
 Result<VolumeStats> stats_of(const Options& o, const OpenOptions& open, const Input& input, Run& run) {
   run.stage("stats");
-  if (input.source->info().format != VoxelFormat::float32) return volume_stats(*input.source, {}, run.ctx);
+  const bool floats = input.source->info().format == VoxelFormat::float32,
+             used_up = o.check && input.source->forward_only();
+  if (!floats && !used_up) return volume_stats(*input.source, {}, run.ctx);
   if (o.file == "-")
-    return bad_usage("--stats: the floats of a stream cannot be looked at twice: name a file");
+    return bad_usage("--stats: of floats, or with --check: a stream cannot be looked at twice: name a file");
+  ValueRange range;
+  if (floats) {
+    VOX_TRY(const Input measured, open_input(o.file, open, run.ctx));
+    VOX_TRY(range, measure_range(*measured.source, run.ctx));
+  }
   VOX_TRY(const Input again, open_input(o.file, open, run.ctx));
-  VOX_TRY(const ValueRange range, measure_range(*again.source, run.ctx));
-  return volume_stats(*input.source, range, run.ctx);
+  return volume_stats(*again.source, range, run.ctx);
 }
 
 /// The bytes that a view needs, with their sum.

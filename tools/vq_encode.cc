@@ -31,13 +31,8 @@ struct Options {
 };
 
 void declare(CommandLine& line, Options& o) {
-  line.arguments("INPUT", "Volume file, folder or pattern of images, built-in such as sphere:64, or -",
-                 o.batch.inputs);
-  line.file(
-      "-o,--output", "OUT",
-      "Output (.vqv), or -; of several inputs a folder that exists or ends with /, or a name with {stem}",
-      o.batch.output, true);
-  declare_batch(line, o.batch);
+  declare_batch(line, "Volume file, folder or pattern of images, built-in such as sphere:64, or -", ".vqv",
+                o.batch);
   line.flag("--lossless", "Every voxel as it is; floats are refused (default, but floats get 65536 levels)",
             o.lossless);
   line.option("--max-error", "E", "No voxel is further than this from the original, in sample values",

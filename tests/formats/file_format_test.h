@@ -110,6 +110,15 @@ class FileFormatTest : public testing::Test {
     EXPECT_EQ(*back, voxels);
   }
 
+  /// That it opens, and its voxels are these bytes.
+  void expect_voxels(SourceResult source, const std::string& expected) {
+    ASSERT_TRUE(source) << source.error().what;
+    const auto voxels = read(**source);
+    ASSERT_TRUE(voxels) << voxels.error().what;
+    EXPECT_EQ(std::string(reinterpret_cast<const char*>(voxels->data()), voxels->size()), expected);
+    read_info_ = (*source)->info();
+  }
+
   /// Opens and, if the header is accepted and small, reads. What fails must be an error of the input.
   Status try_file(const std::string& file) {
     auto source = open_volume(file, {}, ctx_);
@@ -160,7 +169,7 @@ class FileFormatTest : public testing::Test {
   std::vector<std::string> notes_;  ///< in the order in which they came
   MemoryBudget memory_;
   Context ctx_;
-  VolumeInfo read_info_;  ///< of the last round trip
+  VolumeInfo read_info_;  ///< of what was read last
   std::mt19937 random_{7};
 };
 

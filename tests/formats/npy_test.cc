@@ -29,13 +29,9 @@ class NpyTest : public FileFormatTest {
     for (const bool piped : {false, true}) {
       SCOPED_TRACE(piped);
       const std::string file = put("v.npy", content);
-      auto source =
-          piped ? open_npy(std::move(*open_stream(file)), options, ctx_) : open_volume(file, options, ctx_);
-      ASSERT_TRUE(source) << source.error().what;
-      const auto voxels = read(**source);
-      ASSERT_TRUE(voxels) << voxels.error().what;
-      EXPECT_EQ(std::string(reinterpret_cast<const char*>(voxels->data()), voxels->size()), expected);
-      read_info_ = (*source)->info();
+      FileFormatTest::expect_voxels(
+          piped ? open_npy(std::move(*open_stream(file)), options, ctx_) : open_volume(file, options, ctx_),
+          expected);
     }
   }
 };

@@ -117,7 +117,14 @@ class OutputFolder {
 
 }  // namespace
 
-void declare_batch(CommandLine& line, Batch& batch) {
+void declare_batch(CommandLine& line, const std::string& help, std::string_view ending, Batch& batch) {
+  line.arguments("INPUT", help, batch.inputs);
+  line.file(
+      "-o,--output", "OUT",
+      fmt::format("Output ({}), or -; one for each of several inputs: a folder that exists or ends with "
+                  "/, or a name with {}",
+                  ending, stem_field),
+      batch.output, true);
   line.flag("--recursive",
             "Of an INPUT that is a folder: each volume or model in it, and in those below, by itself",
             batch.recursive);

@@ -16,8 +16,9 @@ struct Batch {
   std::string output;  ///< a file; or a folder, or a name with {stem}, of which each input has one
   bool recursive = false, skip_existing = false, keep_going = false;
 };
-/// Declares --recursive, --skip-existing and --keep-going.
-void declare_batch(CommandLine& line, Batch& batch);
+/// Declares INPUT, of which `help` says what it may be, --output, for files with this ending, --recursive,
+/// --skip-existing and --keep-going.
+void declare_batch(CommandLine& line, const std::string& help, std::string_view ending, Batch& batch);
 
 /// Whether the output ends with a slash or has {stem} in its name; or is a folder that exists, of several
 /// inputs. One input is not put into a folder by accident.
